@@ -1,0 +1,45 @@
+# One word per job; the work is done by CMake. `make demo` and `make test` need nothing but Debian 12.
+
+PACKAGES := $(shell cat cmake/packages.txt)
+SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+RESULTS := build/demo
+
+.PHONY: all deps build demo test bench docs format lint clean
+
+all: build
+
+deps:
+	@dpkg -s $(PACKAGES) >/dev/null 2>&1 || { \
+	  $(SUDO) apt-get update && \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(PACKAGES); }
+
+build: deps
+	cmake --preset release -DNEPHELE_BUILD_TESTS=OFF -DNEPHELE_BUILD_BENCHMARKS=OFF
+	cmake --build build
+
+demo: build
+	sh data/demo.sh build/bin/nephele $(RESULTS)
+
+test: deps
+	cmake --preset release -DNEPHELE_BUILD_TESTS=ON -DNEPHELE_BUILD_BENCHMARKS=OFF
+	cmake --build build
+	sh tests/check_includes.sh
+	ctest --test-dir build --output-on-failure --parallel 2
+
+bench: deps
+	cmake --preset release -DNEPHELE_BUILD_TESTS=OFF -DNEPHELE_BUILD_BENCHMARKS=ON
+	cmake --build build
+	python3 tests/bench/run.py build bench-results
+
+docs: build
+	sh docs/update_help.sh $(CURDIR)/build/bin/nephele
+
+format:
+	clang-format -i $$(git ls-files '*.h' '*.cpp')
+
+lint:
+	clang-format --dry-run --Werror $$(git ls-files '*.h' '*.cpp')
+	sh tests/check_includes.sh
+
+clean:
+	rm -rf build build-debug build-asan build-tsan bench-results

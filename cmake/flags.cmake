@@ -1,0 +1,19 @@
+# The flags of all our targets. No value-changing optimisation: results must not depend on how loops were vectorised.
+add_library(nephele_flags INTERFACE)
+target_compile_options(nephele_flags INTERFACE
+  -fno-math-errno -fno-trapping-math -ffp-contract=off
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  $<$<BOOL:${NEPHELE_WARNINGS_AS_ERRORS}>:-Werror>)
+target_include_directories(nephele_flags INTERFACE ${PROJECT_SOURCE_DIR})
+
+set(CMAKE_CXX_FLAGS_RELEASE "-O3")
+
+if(NEPHELE_SANITIZE STREQUAL "address")
+  add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
+  add_link_options(-fsanitize=address,undefined)
+elseif(NEPHELE_SANITIZE STREQUAL "thread")
+  add_compile_options(-fsanitize=thread)
+  add_link_options(-fsanitize=thread)
+elseif(NEPHELE_SANITIZE)
+  message(FATAL_ERROR "NEPHELE_SANITIZE must be empty, address or thread, got '${NEPHELE_SANITIZE}'")
+endif()
