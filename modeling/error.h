@@ -1,0 +1,31 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace nephele {
+
+/// The one exception type of the library: bad arguments, bad files, work that cannot be done.
+/// The message is a sentence for a person: it names the argument or file, the value found and what is
+/// allowed.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Thrown out of long work when its Progress reports that it was cancelled.
+class Cancelled : public Error {
+ public:
+  Cancelled() : Error("cancelled") {}
+};
+
+/// Checks an argument of a public entry point; always on.
+/// @throws Error with `message` if `condition` is false.
+inline void require(bool condition, const char* message) {
+  if (!condition) throw Error(message);
+}
+inline void require(bool condition, const std::string& message) {
+  if (!condition) throw Error(message);
+}
+
+}  // namespace nephele

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "levelset/brick_grid.h"
+#include "modeling/function_field.h"
+
+namespace nephele::test {
+
+/// A grid with a brick of its own at every position, whose samples are value(voxel).
+template <class F>
+std::shared_ptr<BrickGrid> denseGrid(const Vec3i& firstBrick, const Vec3i& brickCount, const F& value,
+                                     const Affine& indexToWorld = {}, float background = 0.0f) {
+  auto grid = std::make_shared<BrickGrid>();
+  grid->indexToWorld = indexToWorld;
+  grid->worldToIndex = inverse(indexToWorld);
+  grid->voxelSize = std::cbrt(std::abs(determinant(indexToWorld.linear)));
+  grid->background = background;
+  grid->firstBrick = firstBrick;
+  grid->brickCount = brickCount;
+  const int count = brickCount.x * brickCount.y * brickCount.z;
+  for (int i = 0; i < count; ++i) grid->table.push_back(i + 1);
+  grid->values.assign(std::size_t(count + 1) * BrickGrid::kVolume, background);
+  for (int i = 0; i < count; ++i) {
+    const Vec3i b = firstBrick + Vec3i{i % brickCount.x, i / brickCount.x % brickCount.y,
+                                       i / (brickCount.x * brickCount.y)};
+    for (int z = 0; z < 8; ++z)
+      for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 8; ++x)
+          grid->brick(i + 1)[sampleOffset(x, y, z)] =
+              float(value(Vec3i{b.x * 8 + x, b.y * 8 + y, b.z * 8 + z}));
+  }
+  fillBorders(*grid);
+  return grid;
+}
+
+/// Reproducible numbers that belong to a voxel, in [-1, 1].
+inline float scatter(const Vec3i& v) {
+  std::uint32_t h =
+      std::uint32_t(v.x) * 73856093u ^ std::uint32_t(v.y) * 19349663u ^ std::uint32_t(v.z) * 83492791u;
+  h = (h ^ h >> 13) * 0x5bd1e995u;
+  return float((h ^ h >> 15) & 0xffff) / 32767.5f - 1.0f;
+}
+
+/// radius - |x - center| with its exact range, as a user's function that counts how often it is called.
+inline ScalarField countedBall(const Vec3f& center, float radius, std::atomic<std::size_t>& calls) {
+  FunctionOptions<float> options;
+  options.range = [=](const Box& box) {
+    double nearest = 0, farthest = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double low = double(box.min[a]) - center[a], high = double(box.max[a]) - center[a];
+      const double inside = low > 0 ? low : high < 0 ? -high : 0.0, outside = std::max(-low, high);
+      nearest += inside * inside;
+      farthest += outside * outside;
+    }
+    const float slack = 1e-5f * radius;
+    return Interval{radius - float(std::sqrt(farthest)) - slack, radius - float(std::sqrt(nearest)) + slack};
+  };
+  return functionField(
+      [&calls, center, radius](const Vec3f& p) {
+        calls.fetch_add(1, std::memory_order_relaxed);
+        return radius - length(p - center);
+      },
+      options);
+}
+
+inline ScalarField ball(const Vec3f& center, float radius) {
+  static std::atomic<std::size_t> ignored;
+  return countedBall(center, radius, ignored);
+}
+
+}  // namespace nephele::test
