@@ -1,0 +1,88 @@
+// The way from a mesh to a cloud: base distance, layers, density; each part lives in its own file.
+#include "levelset/cloud.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "levelset/marching_cubes.h"
+#include "levelset/mesh_io.h"
+#include "levelset/mesh_to_level_set.h"
+#include "modeling/error.h"
+
+namespace nephele {
+
+namespace {
+
+bool isVolumeFile(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
+  return extension == ".vdb" || extension == ".nvdb";
+}
+
+Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
+  const VdbGrid grid = readScalarGrid(path);
+  const VdbGridInfo info = describe(grid);
+  require(info.gridClass == VdbGridInfo::Class::levelSet,
+          path + ": grid '" + info.name + "' is not a level set; a cloud grows on a mesh or on a level set");
+  Mesh mesh = marchingCubes(*toBricks(grid), 0.0f, progress);
+  require(mesh.faceCount() > 0, path + ": grid '" + info.name + "' has no surface");
+  return mesh;
+}
+
+/// Where the last layer is coarser than the result, a base as coarse holds what that layer can follow.
+float baseVoxelSize(const std::vector<CumuloLayer>& layers, float voxelSize) {
+  return std::max(voxelSize, cumuloVoxelSize(layers, layers.size() - 1, voxelSize));
+}
+
+}  // namespace
+
+RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
+  return repairMesh(isVolumeFile(path) ? surfaceOfLevelSet(path, progress) : readMesh(path), repair,
+                    progress);
+}
+
+Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+  require(options.voxelSize > 0,
+          "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  const std::vector<CumuloLayer> layers = cumuloLayers(options.layers);
+  progress.begin("distance");
+  const ScalarField base = meshDistance(mesh,
+                                        {.voxelSize = baseVoxelSize(layers, options.voxelSize),
+                                         .exteriorBand = cumuloExteriorBand(layers, options.voxelSize),
+                                         .interiorBand = cumuloInteriorBand(layers, options.voxelSize)},
+                                        progress);
+  GriddedCumulo cumulo = griddedCumulo(base, layers,
+                                       {.voxelSize = options.voxelSize,
+                                        .box = boundingBox(mesh),
+                                        .newtonSteps = options.newtonSteps,
+                                        .medialSmoothing = options.medialSmoothing,
+                                        .renormalise = options.renormalise},
+                                       progress);
+  Cloud cloud{cloudDensity(cumulo,
+                           {.voxelSize = options.voxelSize,
+                            .edgeThickness = options.edgeThickness,
+                            .halfFloat = options.halfFloat},
+                           progress),
+              {},
+              std::move(cumulo.layers)};
+  if (options.withSurface)
+    cloud.surface = cloudSurface(cumulo, options.voxelSize, options.halfFloat, progress);
+  return cloud;
+}
+
+double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
+  // Measured on the bunny at resolutions 256 to 1024. Displaced surfaces are larger than their base; per area
+  // of the base in voxels, the result then holds some 30 voxels and the distance to the base, with borders,
+  // some 100.
+  constexpr double kGrowth = 1.5, kResultVoxels = 30, kBaseVoxels = 100;
+  const std::vector<CumuloLayer> layers = cumuloLayers(options.layers);
+  const double area = surfaceArea(mesh), voxel = options.voxelSize;
+  const double baseVoxel = baseVoxelSize(layers, options.voxelSize);
+  const double grids = options.withSurface ? 2 : 1;
+  return estimatedCumuloBytes(layers, options.voxelSize, area * kGrowth) +
+         sizeof(float) * area *
+             (kBaseVoxels / (baseVoxel * baseVoxel) + kResultVoxels * grids / (voxel * voxel));
+}
+
+}  // namespace nephele

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "levelset/cloud_density.h"
+#include "levelset/mesh_repair.h"
+#include "modeling/mesh.h"
+
+namespace nephele {
+
+/// Everything between a mesh and the grids of its cloud. Lengths in world units.
+struct CloudOptions {
+  CumuloFractal layers;
+  /// > 0.
+  float voxelSize = 0.0f;
+  int newtonSteps = 5;
+  int medialSmoothing = 4;
+  CumuloGridOptions::Renormalise renormalise = CumuloGridOptions::Renormalise::off;
+  /// > 0; see CloudDensityOptions.
+  float edgeThickness = 0.0f;
+  /// Makes the displaced level set, too.
+  bool withSurface = false;
+  bool halfFloat = false;
+};
+
+struct Cloud {
+  VdbGrid density;
+  std::optional<VdbGrid> surface;
+  std::vector<CumuloLayerReport> layers;
+};
+
+/// Grows cumulo layers on a closed, outward-oriented mesh: distance with the band that the displacement
+/// needs, layers, density. @throws Error for options outside their range; Cancelled.
+Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress = silent());
+
+/// Memory that `makeCloud` needs, bytes, from the area of the mesh.
+double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options);
+
+/// The shape in a file as a closed mesh: a mesh file, repaired, or the zero surface of a level set in a .vdb
+/// or .nvdb. A narrow band is no distance where the displacement needs one; its surface gives that back.
+/// @throws Error naming the path: unreadable, no level set, not closed and not to be repaired.
+RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair = {},
+                       const Progress& progress = silent());
+
+}  // namespace nephele

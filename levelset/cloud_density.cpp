@@ -1,0 +1,230 @@
+// Works slab by slab, each an octree from blocks of 64^3 voxels down to leaves of 8^3. A sampled estimate of
+// the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's error
+// is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum. Leaves
+// go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would hold
+// every value almost three times.
+//
+// Limits: at a crease of the surface the estimate can be off by more than its stated error; the voxels
+// concerned then differ by less than an edge thickness in position.
+#include "levelset/cloud_density.h"
+
+#include <openvdb/tools/Prune.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "levelset/detail_vdb.h"
+#include "levelset/grid_field.h"
+#include "modeling/error.h"
+#include "modeling/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr int kLeaf = int(Leaf::DIM);
+constexpr int kBlock = 64;
+constexpr int kLevelSetHalfWidth = 3;
+
+/// What a value of l becomes in the file.
+class DensityRule {
+ public:
+  explicit DensityRule(float edge) : edge_(edge) {}
+  /// Values of l at and beyond whose ends the file's value does not change.
+  Interval band() const { return {-edge_ / 2, edge_ / 2}; }
+  float operator()(float l) const {
+    const float t = std::clamp(l / edge_ + 0.5f, 0.0f, 1.0f);
+    return t * t * (3 - 2 * t);
+  }
+  bool isActive(float value) const { return value > 0; }
+  float background() const { return 0; }
+
+ private:
+  float edge_;
+};
+
+class LevelSetRule {
+ public:
+  explicit LevelSetRule(float halfWidth) : halfWidth_(halfWidth) {}
+  Interval band() const { return {-halfWidth_, halfWidth_}; }
+  float operator()(float l) const { return -std::clamp(l, -halfWidth_, halfWidth_); }
+  bool isActive(float value) const { return std::abs(value) < halfWidth_; }
+  float background() const { return halfWidth_; }
+
+ private:
+  float halfWidth_;
+};
+
+/// What one block of the octree came to.
+struct Block {
+  std::vector<std::unique_ptr<Leaf>> leaves;
+  std::vector<openvdb::Coord> insideTiles;
+};
+
+template <class Rule>
+class TreeBuilder {
+ public:
+  TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule)
+      : cloud_(cloud), voxel_(voxelSize), rule_(rule), settled_(rule.band()) {
+    settled_.min -= cloud.estimateError;
+    settled_.max += cloud.estimateError;
+  }
+
+  openvdb::FloatTree::Ptr build(const Progress& progress) const {
+    const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
+    const Vec3f low = cloud_.box.min, high = cloud_.box.max;
+    const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
+    const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
+    auto tree = std::make_shared<openvdb::FloatTree>(rule_.background());
+    std::vector<Block> slab(std::size_t(count.x) * std::size_t(count.y));
+    for (int z = 0; z < count.z; ++z) {
+      const Vec3i corner = first + Vec3i{0, 0, z};
+      const ScalarField estimate = sampledEstimate(corner, {count.x, count.y, 1});
+      parallelFor(slab.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+          progress.check();
+          split((corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock, kBlock, estimate, slab[b]);
+        }
+      });
+      move(slab, *tree);
+      progress.advance(double(z + 1) / count.z);
+    }
+    openvdb::tools::pruneTiles(*tree);
+    return tree;
+  }
+
+ private:
+  Box boxOfVoxels(const Vec3i& first, const Vec3i& count) const {
+    return {Vec3f(first) * voxel_, Vec3f(first + count - Vec3i{1, 1, 1}) * voxel_};
+  }
+
+  /// The estimate over some blocks, on a grid: one slab at a time keeps it small beside the cloud's own
+  /// grids.
+  ScalarField sampledEstimate(const Vec3i& firstBlock, const Vec3i& blocks) const {
+    const float margin = 2 * cloud_.estimateVoxelSize;
+    // A voxel more than the blocks' own, so that even a cloud that lies between two voxels leaves some box.
+    const Box around = boxOfVoxels(firstBlock * kBlock, blocks * kBlock).expanded(margin + voxel_);
+    return bake(cloud_.estimate, {.voxelSize = cloud_.estimateVoxelSize,
+                                  .box = around.intersection(cloud_.box.expanded(margin)),
+                                  .band = {settled_.min - margin, settled_.max + margin}});
+  }
+
+  void split(const Vec3i& first, int width, const ScalarField& estimate, Block& block) const {
+    const Interval l = estimate.range(boxOfVoxels(first, {width, width, width}));
+    if (l.max <= settled_.min) return;
+    if (l.min >= settled_.max) {
+      for (int z = 0; z < width; z += kLeaf)
+        for (int y = 0; y < width; y += kLeaf)
+          for (int x = 0; x < width; x += kLeaf)
+            block.insideTiles.emplace_back(first.x + x, first.y + y, first.z + z);
+      return;
+    }
+    if (width == kLeaf) return evaluate(first, estimate, block);
+    const int half = width / 2;
+    for (int i = 0; i < 8; ++i)
+      split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, estimate, block);
+  }
+
+  void evaluate(const Vec3i& first, const ScalarField& estimate, Block& block) const {
+    constexpr int kCount = int(Leaf::SIZE);
+    std::array<float, kCount> x, y, z, l;
+    for (int i = 0; i < kCount; ++i) {
+      // Leaves run along z fastest.
+      x[i] = float(first.x + (i >> 6)) * voxel_;
+      y[i] = float(first.y + (i >> 3 & 7)) * voxel_;
+      z[i] = float(first.z + (i & 7)) * voxel_;
+    }
+    estimate.eval({x, y, z}, std::span<float>(l));
+
+    std::array<float, kCount> nearX, nearY, nearZ, exact;
+    std::array<int, kCount> place;
+    std::size_t count = 0;
+    for (int i = 0; i < kCount; ++i) {
+      if (l[i] <= settled_.min || l[i] >= settled_.max) continue;
+      nearX[count] = x[i];
+      nearY[count] = y[i];
+      nearZ[count] = z[i];
+      place[count++] = i;
+    }
+    if (count > 0) {
+      const auto part = [&](std::array<float, kCount>& a) { return std::span<float>(a).first(count); };
+      cloud_.surface.eval({part(nearX), part(nearY), part(nearZ)}, part(exact));
+      for (std::size_t i = 0; i < count; ++i) l[std::size_t(place[i])] = exact[i];
+    }
+
+    bool inside = true, outside = true;
+    for (float& value : l) {
+      inside &= value >= rule_.band().max;
+      outside &= value <= rule_.band().min;
+    }
+    const openvdb::Coord origin(first.x, first.y, first.z);
+    if (inside) block.insideTiles.push_back(origin);
+    if (inside || outside) return;
+    auto leaf = std::make_unique<Leaf>(origin, rule_.background(), false);
+    for (int i = 0; i < kCount; ++i) {
+      const float value = rule_(l[i]);
+      leaf->buffer().setValue(openvdb::Index(i), value);
+      leaf->setActiveState(openvdb::Index(i), rule_.isActive(value));
+    }
+    block.leaves.push_back(std::move(leaf));
+  }
+
+  /// Puts what `blocks` hold into `tree` and empties them.
+  void move(std::vector<Block>& blocks, openvdb::FloatTree& tree) const {
+    openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor(tree);
+    const float inside = rule_(rule_.band().max);
+    for (Block& block : blocks) {
+      for (const openvdb::Coord& origin : block.insideTiles)
+        accessor.addTile(1, origin, inside, rule_.isActive(inside));
+      for (std::unique_ptr<Leaf>& leaf : block.leaves) accessor.addLeaf(leaf.release());
+      block = {};
+    }
+  }
+
+  const GriddedCumulo& cloud_;
+  float voxel_;
+  Rule rule_;
+  Interval settled_;
+};
+
+template <class Rule>
+VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const VdbGridLabel& label,
+                  const Progress& progress) {
+  detail::initializeOpenVdb();
+  auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule).build(progress));
+  grid->setName(label.name);
+  grid->setGridClass(label.gridClass == VdbGridInfo::Class::levelSet ? openvdb::GRID_LEVEL_SET
+                                                                     : openvdb::GRID_FOG_VOLUME);
+  grid->setSaveFloatAsHalf(label.halfFloat);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(double(voxelSize)));
+  return detail::wrapGrid(grid);
+}
+
+}  // namespace
+
+VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                     const Progress& progress) {
+  require(options.voxelSize > 0,
+          "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  require(options.edgeThickness > 0,
+          "cloudDensity: edgeThickness must be > 0, got " + std::to_string(options.edgeThickness));
+  progress.begin("density");
+  return buildGrid(cloud, options.voxelSize, DensityRule(options.edgeThickness),
+                   {"density", VdbGridInfo::Class::fogVolume, options.halfFloat}, progress);
+}
+
+VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat, const Progress& progress) {
+  require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
+  progress.begin("surface");
+  return buildGrid(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize),
+                   {"surface", VdbGridInfo::Class::levelSet, halfFloat}, progress);
+}
+
+}  // namespace nephele

@@ -1,0 +1,530 @@
+// Interpolation of bricked grids at blocks of points.
+//
+// Per point: world to index by the affine map, cell by floor, brick by one table look-up; after that
+// everything is read from that brick, whose border holds what the neighbours contribute. The cells of a
+// vector of points are read as rows of four floats (x - 1 .. x + 2), one load per point and row, and turned
+// into vectors by 4x4 transpositions inside 128-bit blocks. That takes a fraction of the time of a gather
+// instruction per sample, and the addresses are 64-bit, so that the pool may be of any size.
+//
+// All arithmetic is written as differences and one product and sum per weight, never fused: constants come
+// out exactly, and the vector code gives the bits of the plain loops on every instruction set. Limit: index
+// coordinates are floats; positions inside a voxel fade beyond some 10^5 voxels from the origin.
+
+#include "levelset/grid_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "levelset/grid_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef NEPHELE_GRID_KERNELS_ONCE
+#define NEPHELE_GRID_KERNELS_ONCE
+
+namespace nephele {
+
+namespace {
+
+constexpr int kRow = BrickGrid::kWidth;
+constexpr int kPlane = kRow * kRow;
+
+/// Offset of the row at (y - 1 + j, z - 1 + k) from a cell's first stored sample (x - 1, y - 1, z - 1).
+constexpr int rowOffset(int j, int k) {
+  return k * kPlane + j * kRow;
+}
+
+/// What locating a point needs, taken out of the grid once per block.
+struct GridMap {
+  std::array<float, 9> linear;
+  std::array<float, 3> translation, low, high;
+  std::array<int, 3> first;
+  int countX, countY;
+  /// No rotation or shear: each index coordinate depends on one world coordinate.
+  bool diagonal;
+  const std::int32_t* table;
+  const float* values;
+};
+
+float notBelow(double v) {
+  const float f = float(v);
+  return f < v ? std::nextafter(f, HUGE_VALF) : f;
+}
+
+GridMap mapOf(const BrickGrid& grid) {
+  const Mat3f& m = grid.worldToIndex.linear;
+  const Vec3f& t = grid.worldToIndex.translation;
+  GridMap map{m.m,
+              {t.x, t.y, t.z},
+              {},
+              {},
+              {},
+              grid.brickCount.x,
+              grid.brickCount.y,
+              true,
+              grid.table.data(),
+              grid.values.data()};
+  for (int axis = 0; axis < 3; ++axis) {
+    map.first[axis] = grid.firstBrick[axis];
+    map.low[axis] = notBelow(8.0 * grid.firstBrick[axis]);
+    map.high[axis] = -notBelow(-8.0 * (double(grid.firstBrick[axis]) + grid.brickCount[axis]));
+    for (int column = 0; column < 3; ++column)
+      if (column != axis && m(axis, column) != 0) map.diagonal = false;
+  }
+  return map;
+}
+
+/// The cell of a point: its fractions and the stored sample one before its corner in x, y and z.
+struct Cell {
+  float fx, fy, fz;
+  const float* corner;
+};
+
+Cell locate(const GridMap& map, float x, float y, float z) {
+  const auto& m = map.linear;
+  const auto& t = map.translation;
+  float q[3];
+  if (map.diagonal) {
+    q[0] = m[0] * x + t[0], q[1] = m[4] * y + t[1], q[2] = m[8] * z + t[2];
+  } else {
+    for (int a = 0; a < 3; ++a) q[a] = m[3 * a] * x + m[3 * a + 1] * y + m[3 * a + 2] * z + t[a];
+  }
+  for (int a = 0; a < 3; ++a)
+    if (!(q[a] >= map.low[a] && q[a] < map.high[a])) return {0, 0, 0, map.values};
+  int brick[3], local[3];
+  float f[3];
+  for (int a = 0; a < 3; ++a) {
+    const float cell = std::floor(q[a]);
+    f[a] = q[a] - cell;
+    brick[a] = brickOf(int(cell)) - map.first[a];
+    local[a] = insideBrick(int(cell));
+  }
+  const std::size_t pool =
+      std::size_t(map.table[(std::size_t(brick[2]) * map.countY + brick[1]) * map.countX + brick[0]]);
+  return {f[0], f[1], f[2],
+          map.values + pool * BrickGrid::kVolume + (local[2] * kRow + local[1]) * kRow + local[0]};
+}
+
+float lerp(float a, float b, float f) {
+  return a + f * (b - a);
+}
+
+/// A gradient with respect to index coordinates as one with respect to the world, point `i` of the lanes.
+void storeGradient(const GridMap& map, const std::array<float, 3>& g, const BlockLanes<3>& grads, int i) {
+  const auto& m = map.linear;
+  for (int a = 0; a < 3; ++a)
+    grads[a][i] = map.diagonal ? m[4 * a] * g[a] : m[a] * g[0] + m[3 + a] * g[1] + m[6 + a] * g[2];
+}
+
+/// Catmull-Rom as offsets from the second of four samples: its own weight is one less the others, so that
+/// constants stay exact.
+struct CubicWeights {
+  float w0, w2, w3;
+
+  float operator()(float p0, float p1, float p2, float p3) const { return p1 + offset(p0, p1, p2, p3); }
+  float offset(float p0, float p1, float p2, float p3) const {
+    return w0 * (p0 - p1) + w2 * (p2 - p1) + w3 * (p3 - p1);
+  }
+};
+
+CubicWeights cubicWeights(float t) {
+  const float h = 0.5f * t, s = 1.0f - t;
+  return {-(h * s) * s, h * (1.0f + t * (4.0f - 3.0f * t)), -(h * t) * s};
+}
+
+CubicWeights cubicSlopes(float t) {
+  return {0.5f * (t * (4.0f - 3.0f * t) - 1.0f), 0.5f * (1.0f + t * (8.0f - 9.0f * t)),
+          0.5f * (t * (3.0f * t - 2.0f))};
+}
+
+bool fillIfEmpty(const BrickGrid& grid, const PointBlock& points, float* values, const BlockLanes<3>* grads) {
+  if (!grid.table.empty()) return false;
+  std::fill_n(values, points.paddedCount(), grid.background);
+  if (grads)
+    for (float* lane : *grads) std::fill_n(lane, points.paddedCount(), 0.0f);
+  return true;
+}
+
+}  // namespace
+
+void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (fillIfEmpty(grid, points, values, nullptr)) return;
+  const GridMap map = mapOf(grid);
+  for (int i = 0; i < points.count; ++i) {
+    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    float plane[2];
+    for (int k = 0; k < 2; ++k) {
+      const float* a = cell.corner + rowOffset(1, k + 1);
+      const float* b = cell.corner + rowOffset(2, k + 1);
+      plane[k] = lerp(lerp(a[1], a[2], cell.fx), lerp(b[1], b[2], cell.fx), cell.fy);
+    }
+    values[i] = lerp(plane[0], plane[1], cell.fz);
+  }
+}
+
+void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
+                               const BlockLanes<3>& grads) {
+  if (fillIfEmpty(grid, points, values, &grads)) return;
+  const GridMap map = mapOf(grid);
+  for (int i = 0; i < points.count; ++i) {
+    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const float fx = cell.fx, fy = cell.fy, fz = cell.fz;
+    // r[k][j] and dx[k][j]: the rows at z - 1 + k, y - 1 + j, interpolated in x, and their difference along
+    // x.
+    float r[4][4] = {}, dx[4][4] = {};
+    for (int k = 0; k < 4; ++k)
+      for (int j = 0; j < 4; ++j) {
+        const float* row = cell.corner + rowOffset(j, k);
+        r[k][j] = lerp(row[1], row[2], fx);
+        dx[k][j] = lerp(row[2] - row[0], row[3] - row[1], fx);
+      }
+    const auto alongY = [&](int k) { return lerp(r[k][2] - r[k][0], r[k][3] - r[k][1], fy); };
+    const auto alongZ = [&](int j) { return lerp(r[2][j] - r[0][j], r[3][j] - r[1][j], fz); };
+    values[i] = lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz);
+    storeGradient(map,
+                  {0.5f * lerp(lerp(dx[1][1], dx[1][2], fy), lerp(dx[2][1], dx[2][2], fy), fz),
+                   0.5f * lerp(alongY(1), alongY(2), fz), 0.5f * lerp(alongZ(1), alongZ(2), fy)},
+                  grads, i);
+  }
+}
+
+void sampleTricubicScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (fillIfEmpty(grid, points, values, nullptr)) return;
+  const GridMap map = mapOf(grid);
+  for (int i = 0; i < points.count; ++i) {
+    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
+    float plane[4];
+    for (int k = 0; k < 4; ++k) {
+      float row[4];
+      for (int j = 0; j < 4; ++j) {
+        const float* s = cell.corner + rowOffset(j, k);
+        row[j] = wx(s[0], s[1], s[2], s[3]);
+      }
+      plane[k] = wy(row[0], row[1], row[2], row[3]);
+    }
+    values[i] = wz(plane[0], plane[1], plane[2], plane[3]);
+  }
+}
+
+void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
+                              const BlockLanes<3>& grads) {
+  if (fillIfEmpty(grid, points, values, &grads)) return;
+  const GridMap map = mapOf(grid);
+  for (int i = 0; i < points.count; ++i) {
+    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
+    const CubicWeights sx = cubicSlopes(cell.fx), sy = cubicSlopes(cell.fy), sz = cubicSlopes(cell.fz);
+    float v[4], dx[4], dy[4];
+    for (int k = 0; k < 4; ++k) {
+      float row[4], slope[4];
+      for (int j = 0; j < 4; ++j) {
+        const float* s = cell.corner + rowOffset(j, k);
+        row[j] = wx(s[0], s[1], s[2], s[3]);
+        slope[j] = sx.offset(s[0], s[1], s[2], s[3]);
+      }
+      v[k] = wy(row[0], row[1], row[2], row[3]);
+      dx[k] = wy(slope[0], slope[1], slope[2], slope[3]);
+      dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
+    }
+    values[i] = wz(v[0], v[1], v[2], v[3]);
+    storeGradient(
+        map,
+        {wz(dx[0], dx[1], dx[2], dx[3]), wz(dy[0], dy[1], dy[2], dy[3]), sz.offset(v[0], v[1], v[2], v[3])},
+        grads, i);
+  }
+}
+
+}  // namespace nephele
+
+#endif  // NEPHELE_GRID_KERNELS_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace nephele {
+namespace HWY_NAMESPACE {
+
+// Reading rows takes vectors of a size known when compiling; others use the plain loops.
+#if HWY_HAVE_SCALABLE || HWY_TARGET == HWY_SCALAR
+
+void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+  sampleTrilinearScalar(grid, points, values);
+}
+void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                   const BlockLanes<3>& grads) {
+  sampleTrilinearGradScalar(grid, points, values, grads);
+}
+void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+  sampleTricubicScalar(grid, points, values);
+}
+void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                  const BlockLanes<3>& grads) {
+  sampleTricubicGradScalar(grid, points, values, grads);
+}
+
+#else
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<float, 16>;
+using V = hn::Vec<D>;
+using DI = hn::RebindToSigned<D>;
+using VI = hn::Vec<DI>;
+constexpr int kLanes = int(hn::MaxLanes(D()));
+
+struct Cells {
+  V fx, fy, fz;
+  const float* corner[kLanes];
+};
+
+HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cells& cells) {
+  const D d;
+  const DI di;
+  const V x = hn::LoadU(d, points.x + i), y = hn::LoadU(d, points.y + i), z = hn::LoadU(d, points.z + i);
+  const auto& m = map.linear;
+  const auto set = [&](float v) HWY_ATTR { return hn::Set(d, v); };
+  V q[3];
+  if (map.diagonal) {
+    q[0] = set(m[0]) * x, q[1] = set(m[4]) * y, q[2] = set(m[8]) * z;
+  } else {
+    for (int a = 0; a < 3; ++a) q[a] = set(m[3 * a]) * x + set(m[3 * a + 1]) * y + set(m[3 * a + 2]) * z;
+  }
+  for (int a = 0; a < 3; ++a) q[a] = q[a] + set(map.translation[a]);
+  auto inside = hn::And(hn::Ge(q[0], set(map.low[0])), hn::Lt(q[0], set(map.high[0])));
+  for (int a = 1; a < 3; ++a)
+    inside = hn::And(inside, hn::And(hn::Ge(q[a], set(map.low[a])), hn::Lt(q[a], set(map.high[a]))));
+
+  V f[3];
+  VI brick[3], local[3];
+  for (int a = 0; a < 3; ++a) {
+    q[a] = hn::IfThenElseZero(inside, q[a]);
+    const V cell = hn::Floor(q[a]);
+    f[a] = q[a] - cell;
+    const VI voxel = hn::ConvertTo(di, cell);
+    brick[a] = hn::ShiftRight<3>(voxel) - hn::Set(di, map.first[a]);
+    local[a] = hn::And(voxel, hn::Set(di, 7));
+  }
+  cells.fx = f[0], cells.fy = f[1], cells.fz = f[2];
+  const VI width = hn::Set(di, kRow);
+  const VI index = (brick[2] * hn::Set(di, map.countY) + brick[1]) * hn::Set(di, map.countX) + brick[0];
+  const VI offset = (local[2] * width + local[1]) * width + local[0];
+  const VI keep = hn::VecFromMask(di, hn::RebindMask(di, inside));
+  HWY_ALIGN std::int32_t entry[kLanes], start[kLanes], mask[kLanes];
+  hn::Store(hn::And(index, keep), di, entry);
+  hn::Store(offset, di, start);
+  hn::Store(keep, di, mask);
+  for (int l = 0; l < kLanes; ++l)
+    cells.corner[l] = map.values + std::size_t(map.table[entry[l]] & mask[l]) * BrickGrid::kVolume + start[l];
+}
+
+/// Element e of every 128-bit block b: four floats of point 4 b + e.
+template <int kElement>
+HWY_INLINE V loadFours(const Cells& cells, int offset) {
+  const D d;
+  const hn::Full128<float> d4;
+  const auto four = [&](int block)
+                        HWY_ATTR { return hn::LoadU(d4, cells.corner[4 * block + kElement] + offset); };
+#if HWY_MAX_BYTES >= 64
+  const hn::Half<D> half;
+  return hn::Combine(d, hn::Combine(half, four(3), four(2)), hn::Combine(half, four(1), four(0)));
+#elif HWY_MAX_BYTES == 32
+  return hn::Combine(d, four(1), four(0));
+#else
+  static_cast<void>(d);
+  return four(0);
+#endif
+}
+
+/// The samples x - 1 .. x + 2 of one row for all points of a vector.
+struct Row {
+  V before, left, right, after;
+};
+
+HWY_INLINE V lower64(V a, V b) {
+  const hn::Repartition<std::uint64_t, D> d64;
+  return hn::BitCast(D(), hn::InterleaveLower(d64, hn::BitCast(d64, a), hn::BitCast(d64, b)));
+}
+HWY_INLINE V upper64(V a, V b) {
+  const hn::Repartition<std::uint64_t, D> d64;
+  return hn::BitCast(D(), hn::InterleaveUpper(d64, hn::BitCast(d64, a), hn::BitCast(d64, b)));
+}
+
+HWY_INLINE Row loadRow(const Cells& cells, int offset) {
+  const D d;
+  const V p0 = loadFours<0>(cells, offset), p1 = loadFours<1>(cells, offset);
+  const V p2 = loadFours<2>(cells, offset), p3 = loadFours<3>(cells, offset);
+  const V low01 = hn::InterleaveLower(d, p0, p1), low23 = hn::InterleaveLower(d, p2, p3);
+  const V high01 = hn::InterleaveUpper(d, p0, p1), high23 = hn::InterleaveUpper(d, p2, p3);
+  return {lower64(low01, low23), upper64(low01, low23), lower64(high01, high23), upper64(high01, high23)};
+}
+
+HWY_INLINE V lerp(V a, V b, V f) {
+  return a + f * (b - a);
+}
+
+/// One row interpolated in x; the compiler drops what loadRow makes and this does not read.
+HWY_INLINE V rowValue(const Cells& cells, int offset) {
+  const Row row = loadRow(cells, offset);
+  return lerp(row.left, row.right, cells.fx);
+}
+
+HWY_INLINE void storeGradient(const GridMap& map, V gx, V gy, V gz, const BlockLanes<3>& grads, int i) {
+  const D d;
+  const auto& m = map.linear;
+  const V g[3] = {gx, gy, gz};
+  for (int a = 0; a < 3; ++a) {
+    V world = hn::Set(d, m[4 * a]) * g[a];
+    if (!map.diagonal) world = hn::Set(d, m[a]) * gx + hn::Set(d, m[3 + a]) * gy + hn::Set(d, m[6 + a]) * gz;
+    hn::StoreU(world, d, grads[a] + i);
+  }
+}
+
+void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+  const D d;
+  const GridMap map = mapOf(grid);
+  Cells cells;
+  for (int i = 0; i < points.count; i += kLanes) {
+    locate(map, points, i, cells);
+    const V plane0 = lerp(rowValue(cells, rowOffset(1, 1)), rowValue(cells, rowOffset(2, 1)), cells.fy);
+    const V plane1 = lerp(rowValue(cells, rowOffset(1, 2)), rowValue(cells, rowOffset(2, 2)), cells.fy);
+    hn::StoreU(lerp(plane0, plane1, cells.fz), d, values + i);
+  }
+}
+
+void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                   const BlockLanes<3>& grads) {
+  const D d;
+  const V half = hn::Set(d, 0.5f);
+  const GridMap map = mapOf(grid);
+  Cells cells;
+  for (int i = 0; i < points.count; i += kLanes) {
+    locate(map, points, i, cells);
+    const V fx = cells.fx, fy = cells.fy, fz = cells.fz;
+    V v[2], dx[2], dy[2], r[2][2];
+    for (int k = 0; k < 2; ++k) {
+      const Row a = loadRow(cells, rowOffset(1, k + 1)), b = loadRow(cells, rowOffset(2, k + 1));
+      r[k][0] = lerp(a.left, a.right, fx);
+      r[k][1] = lerp(b.left, b.right, fx);
+      v[k] = lerp(r[k][0], r[k][1], fy);
+      dx[k] = lerp(lerp(a.right - a.before, a.after - a.left, fx),
+                   lerp(b.right - b.before, b.after - b.left, fx), fy);
+      const V before = rowValue(cells, rowOffset(0, k + 1)), after = rowValue(cells, rowOffset(3, k + 1));
+      dy[k] = lerp(r[k][1] - before, after - r[k][0], fy);
+    }
+    V dz[2];
+    for (int j = 0; j < 2; ++j) {
+      const V before = rowValue(cells, rowOffset(j + 1, 0)), after = rowValue(cells, rowOffset(j + 1, 3));
+      dz[j] = lerp(r[1][j] - before, after - r[0][j], fz);
+    }
+    hn::StoreU(lerp(v[0], v[1], fz), d, values + i);
+    storeGradient(map, half * lerp(dx[0], dx[1], fz), half * lerp(dy[0], dy[1], fz),
+                  half * lerp(dz[0], dz[1], fy), grads, i);
+  }
+}
+
+struct Weights {
+  V w0, w2, w3;
+
+  HWY_INLINE V offset(V p0, V p1, V p2, V p3) const {
+    return w0 * (p0 - p1) + w2 * (p2 - p1) + w3 * (p3 - p1);
+  }
+  HWY_INLINE V operator()(V p0, V p1, V p2, V p3) const { return p1 + offset(p0, p1, p2, p3); }
+  HWY_INLINE V operator()(const V* p) const { return operator()(p[0], p[1], p[2], p[3]); }
+};
+
+HWY_INLINE Weights cubicWeights(V t) {
+  const D d;
+  const V one = hn::Set(d, 1.0f), h = hn::Set(d, 0.5f) * t, s = one - t;
+  return {hn::Neg(h * s) * s, h * (one + t * (hn::Set(d, 4.0f) - hn::Set(d, 3.0f) * t)), hn::Neg(h * t) * s};
+}
+
+HWY_INLINE Weights cubicSlopes(V t) {
+  const D d;
+  const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), three = hn::Set(d, 3.0f);
+  return {half * (t * (hn::Set(d, 4.0f) - three * t) - one),
+          half * (one + t * (hn::Set(d, 8.0f) - hn::Set(d, 9.0f) * t)),
+          half * (t * (three * t - hn::Set(d, 2.0f)))};
+}
+
+void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+  const D d;
+  const GridMap map = mapOf(grid);
+  Cells cells;
+  for (int i = 0; i < points.count; i += kLanes) {
+    locate(map, points, i, cells);
+    const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
+    V plane[4];
+    for (int k = 0; k < 4; ++k) {
+      V row[4];
+      for (int j = 0; j < 4; ++j) {
+        const Row s = loadRow(cells, rowOffset(j, k));
+        row[j] = wx(s.before, s.left, s.right, s.after);
+      }
+      plane[k] = wy(row);
+    }
+    hn::StoreU(cubicWeights(cells.fz)(plane), d, values + i);
+  }
+}
+
+void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                  const BlockLanes<3>& grads) {
+  const D d;
+  const GridMap map = mapOf(grid);
+  Cells cells;
+  for (int i = 0; i < points.count; i += kLanes) {
+    locate(map, points, i, cells);
+    const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
+    const Weights sx = cubicSlopes(cells.fx), sy = cubicSlopes(cells.fy);
+    V v[4], dx[4], dy[4];
+    for (int k = 0; k < 4; ++k) {
+      V row[4], slope[4];
+      for (int j = 0; j < 4; ++j) {
+        const Row s = loadRow(cells, rowOffset(j, k));
+        row[j] = wx(s.before, s.left, s.right, s.after);
+        slope[j] = sx.offset(s.before, s.left, s.right, s.after);
+      }
+      v[k] = wy(row);
+      dx[k] = wy(slope);
+      dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
+    }
+    const Weights wz = cubicWeights(cells.fz), sz = cubicSlopes(cells.fz);
+    hn::StoreU(wz(v), d, values + i);
+    storeGradient(map, wz(dx), wz(dy), sz.offset(v[0], v[1], v[2], v[3]), grads, i);
+  }
+}
+
+#endif
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephele
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephele {
+
+HWY_EXPORT(trilinear);
+HWY_EXPORT(trilinearGrad);
+HWY_EXPORT(tricubic);
+HWY_EXPORT(tricubicGrad);
+
+void sampleTrilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(trilinear)(grid, points, values);
+}
+
+void sampleTrilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                         const BlockLanes<3>& grads) {
+  if (!fillIfEmpty(grid, points, values, &grads))
+    HWY_DYNAMIC_DISPATCH(trilinearGrad)(grid, points, values, grads);
+}
+
+void sampleTricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(tricubic)(grid, points, values);
+}
+
+void sampleTricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                        const BlockLanes<3>& grads) {
+  if (!fillIfEmpty(grid, points, values, &grads))
+    HWY_DYNAMIC_DISPATCH(tricubicGrad)(grid, points, values, grads);
+}
+
+}  // namespace nephele
+#endif  // HWY_ONCE

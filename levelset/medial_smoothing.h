@@ -1,0 +1,29 @@
+#pragma once
+
+#include "levelset/brick_grid.h"
+#include "modeling/progress.h"
+
+namespace nephele {
+
+struct MedialSmoothingOptions {
+  /// Largest difference between neighbouring samples that is not a jump, in units of the samples, > 0.
+  float jump = 0.0f;
+  /// Voxels by which the marked places grow before they are smoothed; 0 marks but smooths nothing.
+  int dilation = 4;
+  /// Diffusion steps.
+  int steps = 16;
+};
+
+/// Smooths a displacement where the medial axis makes it jump.
+///
+/// `signedDisplacement` holds samples whose absolute value is the displacement. Around every pair of
+/// neighbours that differ by more than `jump`, the absolute value is diffused, and the bricks that see those
+/// samples lose the sign: a change of sign across a jump is no crease, and interpolating it would cut a false
+/// one. Samples that are exactly 0 lie outside the band; they neither count as jumps nor conduct. Borders and
+/// ranges are up to date afterwards. Each pool brick but brick 0 must stand at one position. All cores; the
+/// same bits at any thread count. Returns the number of samples that were diffused.
+/// @throws Error if jump is not > 0 or a count is negative; Cancelled.
+std::size_t smoothMedialJumps(BrickGrid& signedDisplacement, const MedialSmoothingOptions& options,
+                              const Progress& progress = silent());
+
+}  // namespace nephele

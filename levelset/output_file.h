@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+namespace nephele {
+
+/// An output that appears whole or not at all: written under a temporary name in the target's folder, then
+/// renamed.
+///
+/// The destructor removes the temporary unless `commit` was called. `discardAllOutputs` removes those of a
+/// process that is being killed.
+class OutputFile {
+ public:
+  /// @throws Error naming the path if its folder is missing or not writable, or if it is a folder.
+  explicit OutputFile(std::string path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// Where to write; has the same extension as the target.
+  const std::string& temporaryPath() const { return temporary_; }
+
+  /// Renames the temporary to the target. @throws Error naming the path.
+  void commit();
+
+ private:
+  std::string path_;
+  std::string temporary_;
+  void* entry_ = nullptr;  // where discardAllOutputs finds the temporary
+  bool committed_ = false;
+};
+
+/// Unlinks every temporary that is open now. Safe to call from a signal handler.
+void discardAllOutputs() noexcept;
+
+}  // namespace nephele

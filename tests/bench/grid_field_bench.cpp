@@ -1,0 +1,138 @@
+// Sampling of bricked grids, per point: our kernels, the plain loops beside them, and OpenVDB's BoxSampler on
+// an accessor, all on the same dense 128^3 of samples, along rays (0.4 voxels apart) and at random points.
+// And baking, per active voxel.
+
+#include <benchmark/benchmark.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
+
+#include <random>
+
+#include "levelset/grid_field.h"
+#include "levelset/grid_kernels.h"
+#include "modeling/field_ops.h"
+#include "modeling/noise.h"
+#include "modeling/shapes.h"
+
+namespace nephele {
+namespace {
+
+constexpr int kResolution = 128;
+constexpr int kPoints = 1 << 16;
+
+struct Scene {
+  std::shared_ptr<const BrickGrid> grid;
+  openvdb::FloatGrid::Ptr vdb;
+  /// Along rays, and random.
+  std::array<std::array<std::vector<float>, 3>, 2> points;
+  std::array<std::vector<float>, 4> results;
+};
+
+Scene makeScene() {
+  Scene scene;
+  const float last = kResolution - 1;
+  scene.grid =
+      bakeGrid(perlin({.frequency = 0.1f}), {.voxelSize = 1, .box = {{0, 0, 0}, {last, last, last}}});
+  openvdb::initialize();
+  scene.vdb = openvdb::FloatGrid::create();
+  auto accessor = scene.vdb->getAccessor();
+  for (int z = 0; z < kResolution; ++z)
+    for (int y = 0; y < kResolution; ++y)
+      for (int x = 0; x < kResolution; ++x) accessor.setValue({x, y, z}, scene.grid->at({x, y, z}));
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> u(2, last - 2);
+  for (int i = 0; i < kPoints; ++i) {
+    const int ray = i / 256, step = i % 256;
+    scene.points[0][0].push_back(4 + float(ray % 16) * 0.5f + float(step) * 0.4f * 0.9f);
+    scene.points[0][1].push_back(4 + float(ray / 16) * 0.5f + float(step) * 0.4f * 0.3f);
+    scene.points[0][2].push_back(40 + float(step) * 0.4f * 0.3f);
+    for (auto& lane : scene.points[1]) lane.push_back(u(random));
+  }
+  for (auto& lane : scene.results) lane.resize(kPoints);
+  return scene;
+}
+
+Scene& scene() {
+  static Scene result = makeScene();
+  return result;
+}
+
+template <class Body>
+void perBlock(benchmark::State& state, const Body& body) {
+  Scene& s = scene();
+  const auto& p = s.points[std::size_t(state.range(0))];
+  for (auto _ : state) {
+    for (int i = 0; i < kPoints; i += kBlockSize) {
+      const PointBlock block{p[0].data() + i, p[1].data() + i, p[2].data() + i, kBlockSize,
+                             std::uint64_t(i + 1)};
+      body(*s.grid, block, s.results[0].data() + i,
+           BlockLanes<3>{s.results[1].data() + i, s.results[2].data() + i, s.results[3].data() + i});
+    }
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * kPoints);
+  state.SetLabel(state.range(0) == 0 ? "along rays" : "random");
+}
+
+template <auto kernel>
+void values(benchmark::State& state) {
+  perBlock(state, [](const BrickGrid& grid, const PointBlock& points, float* out, const BlockLanes<3>&) {
+    kernel(grid, points, out);
+  });
+}
+
+template <auto kernel>
+void gradients(benchmark::State& state) {
+  perBlock(state, [](const BrickGrid& grid, const PointBlock& points, float* out,
+                     const BlockLanes<3>& grads) { kernel(grid, points, out, grads); });
+}
+
+void openvdbBoxSampler(benchmark::State& state) {
+  Scene& s = scene();
+  const auto& p = s.points[std::size_t(state.range(0))];
+  const auto accessor = s.vdb->getConstAccessor();
+  for (auto _ : state) {
+    for (int i = 0; i < kPoints; ++i)
+      s.results[0][std::size_t(i)] = openvdb::tools::BoxSampler::sample(
+          accessor, openvdb::Vec3R(p[0][std::size_t(i)], p[1][std::size_t(i)], p[2][std::size_t(i)]));
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * kPoints);
+  state.SetLabel(state.range(0) == 0 ? "along rays" : "random");
+}
+
+/// A sphere with two octaves of noise in a band of 3 voxels; items are active voxels.
+void bakeNoisySphere(benchmark::State& state) {
+  const float h = 2.4f / float(state.range(0));
+  const ScalarField field =
+      sphere({0, 0, 0}, 1.0f) + 0.03f * fractalSum({.octaves = 2, .frequency = 3, .seed = 1});
+  const BakeOptions options{
+      .voxelSize = h, .box = {{-1.2f, -1.2f, -1.2f}, {1.2f, 1.2f, 1.2f}}, .band = {-3 * h, 3 * h}};
+  std::size_t active = 0, bricks = 0, bytes = 0;
+  for (auto _ : state) {
+    const auto grid = bakeGrid(field, options);
+    state.PauseTiming();
+    active = activeVoxelCount(*grid, options.band);
+    bricks = grid->poolSize();
+    bytes = grid->memoryBytes();
+    state.ResumeTiming();
+  }
+  state.SetItemsProcessed(std::int64_t(state.iterations() * active));
+  state.SetLabel(std::to_string(bricks) + " bricks, " + std::to_string(bytes >> 20) + " MB");
+}
+
+BENCHMARK(values<sampleTrilinear>)->Name("trilinear")->Arg(0)->Arg(1);
+BENCHMARK(values<sampleTrilinearScalar>)->Name("trilinear_plain_loop")->Arg(0)->Arg(1);
+BENCHMARK(openvdbBoxSampler)->Name("trilinear_openvdb_box_sampler")->Arg(0)->Arg(1);
+BENCHMARK(gradients<sampleTrilinearGrad>)->Name("trilinear_and_gradient")->Arg(0)->Arg(1);
+BENCHMARK(gradients<sampleTrilinearGradScalar>)->Name("trilinear_and_gradient_plain_loop")->Arg(0)->Arg(1);
+BENCHMARK(values<sampleTricubic>)->Name("tricubic")->Arg(0)->Arg(1);
+BENCHMARK(values<sampleTricubicScalar>)->Name("tricubic_plain_loop")->Arg(0)->Arg(1);
+BENCHMARK(gradients<sampleTricubicGrad>)->Name("tricubic_and_gradient")->Arg(0)->Arg(1);
+BENCHMARK(gradients<sampleTricubicGradScalar>)->Name("tricubic_and_gradient_plain_loop")->Arg(0)->Arg(1);
+BENCHMARK(bakeNoisySphere)->Name("bake")->Arg(256)->Arg(512)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace nephele
+
+BENCHMARK_MAIN();
