@@ -1,0 +1,29 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/image.h"
+
+namespace nephele {
+
+/// Writes an OpenEXR file, ZIP compressed: channels as 16 or 32 bit floats as they say, linear Rec. 709.
+///
+/// Carries `chromaticities`, the camera's `worldToCamera` and `worldToNDC` (see Camera; for row vectors) and
+/// `metadata` as text attributes. 16 bit values beyond 65504 are clamped to it. Written beside `path` and
+/// renamed.
+/// @throws Error naming the path; no partial file stays.
+void writeExr(const std::string& path, const Image& image, const Camera& camera,
+              const std::map<std::string, std::string>& metadata = {});
+
+/// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1.
+/// @throws Error naming the path and what is wrong, also where only pixels are damaged.
+Image readImage(const std::string& path);
+
+/// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes.
+/// Reads every pixel. @throws Error as readImage does.
+std::vector<std::string> describeImage(const std::string& path);
+
+}  // namespace nephele

@@ -1,0 +1,293 @@
+// The sun's way through a volume, in one sweep (notes: "Precomputed Light Transmissivity").
+//
+// The lattice is the density's own, sheared: with w the index axis that the light is closest to, a node (i,
+// j, k) stands at index position (i + s k, j + t k, k), s and t being the light's slopes against w. Its third
+// axis then runs exactly along the light, its slices k coincide with the density's, and all nodes of a slice
+// lie at the same place within their voxels: a density sample is a bilinear mix with constant weights, and
+// the integral a running sum down each column. That works for every affine map from index to
+// world space, and slopes are at most 1, so cells stay well shaped.
+//
+// Only bricks of the lattice that a brick with density reaches into are stored. Between them nothing is
+// added, so a column jumps from one to the next. Neighbouring bricks repeat the nodes they share, computed by
+// the same sums.
+//
+// Between nodes c is interpolated linearly, which overestimates a curved c by its second difference times f
+// (1 - f) / 2, f being the place in the cell: on average by 1/12 of it. Nodes hold c less that average, so
+// that the surface of an opaque cloud, where c curves most, is not too dark.
+//
+// Limits: the column is resolved at the density's own spacing; structure finer than a voxel does not exist
+// there.
+#include "render/light_volume.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "levelset/large_buffer.h"
+#include "modeling/error.h"
+#include "modeling/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr int kN = LightVolume::kWidth + 2;  // nodes across a brick, one more on every side for differences
+constexpr int kPatch = kN + 3;  // density samples around a brick's slice, half a slice up and down
+constexpr int kPitch = 16;      // floats per row of a patch
+constexpr int kRow = 12;        // of which are worked on, a multiple of 4
+constexpr int kArea = kN * kPitch;
+
+}  // namespace
+
+/// Values at the nodes of a brick's slice, and one more on every side.
+struct LightVolume::Nodes : std::array<float, kArea> {};
+
+/// Density samples of a plane, the first of which stands at (u, v).
+struct LightVolume::Patch {
+  int u = 0, v = 0;
+  bool empty = true;
+  alignas(64) std::array<float, (kPatch + 2) * kPitch> samples{};
+};
+
+/// The density seen along one index axis: (u, v) across, w along.
+struct LightVolume::Sweep {
+  const BrickGrid& grid;
+  int u, v, w;
+  float slopeU, slopeV;
+  /// World length of a slice along the light, and whether the light is at the upper end of w.
+  float step;
+  bool fromAbove;
+  int sampleStride[3];
+
+  Sweep(const BrickGrid& density, const Vec3f& light) : grid(density) {
+    w = 0;
+    for (int axis = 1; axis != 3; ++axis)
+      if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
+    u = w == 0 ? 1 : 0;
+    v = w == 2 ? 1 : 2;
+    slopeU = light[u] / light[w];
+    slopeV = light[v] / light[w];
+    step = 1.0f / std::fabs(light[w]);
+    fromAbove = light[w] > 0;
+    sampleStride[0] = 1;
+    sampleStride[1] = BrickGrid::kWidth;
+    sampleStride[2] = BrickGrid::kWidth * BrickGrid::kWidth;
+  }
+
+  Vec3i bricks(int bu, int bv, int bw) const {
+    Vec3i b;
+    b[u] = bu;
+    b[v] = bv;
+    b[w] = bw;
+    return b;
+  }
+
+  // The samples of the plane w = k that the nodes (u0 .. u0 + 10, v0 .. v0 + 10) need, from half a slice
+  // before to half a slice behind it. False if all are zero.
+  bool load(int u0, int v0, int k, Patch& patch) const {
+    patch.u = u0 + int(std::floor(slopeU * float(k))) - 1;
+    patch.v = v0 + int(std::floor(slopeV * float(k))) - 1;
+    patch.empty = true;
+    constexpr int size = BrickGrid::kBrick;
+    const int bw = brickOf(k);
+    for (int v1 = patch.v, vEnd = patch.v + kPatch; v1 < vEnd;) {
+      const int bv = brickOf(v1), v2 = std::min(vEnd, (bv + 1) * size);
+      for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
+        const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
+        const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
+        const bool holds = grid.ranges[std::size_t(pool)].max > 0;
+        patch.empty = patch.empty && !holds;
+        const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w];
+        for (int y = v1; y != v2; ++y) {
+          const float* source =
+              from + (insideBrick(y) + 1) * sampleStride[v] + (insideBrick(u1) + 1) * sampleStride[u];
+          float* row = patch.samples.data() + (y - patch.v) * kPitch + (u1 - patch.u);
+          for (int x = 0; x != u2 - u1; ++x)
+            row[x] = holds ? std::max(source[x * sampleStride[u]], 0.0f) : 0.0f;
+        }
+        u1 = u2;
+      }
+      v1 = v2;
+    }
+    return !patch.empty;
+  }
+
+  // Densities where the nodes from (u0, v0) on pass w, at most half a slice from the patch.
+  void interpolate(const Patch& patch, int u0, int v0, float atW, Nodes& out) const {
+    if (patch.empty) {
+      out.fill(0.0f);
+      return;
+    }
+    const float shiftU = slopeU * atW, shiftV = slopeV * atW;
+    const float floorU = std::floor(shiftU), floorV = std::floor(shiftV);
+    const float fu = shiftU - floorU, fv = shiftV - floorV;
+    const float w00 = (1 - fu) * (1 - fv), w10 = fu * (1 - fv), w01 = (1 - fu) * fv, w11 = fu * fv;
+    const float* first =
+        patch.samples.data() + (v0 + int(floorV) - patch.v) * kPitch + (u0 + int(floorU) - patch.u);
+    for (int j = 0; j != kN; ++j) {
+      const float *a = first + j * kPitch, *b = a + kPitch;
+      float* row = out.data() + j * kPitch;
+      // The whole pitch, so that rows are a round number of vectors; the patch has room behind its last row.
+      for (int i = 0; i != kRow; ++i) row[i] = w00 * a[i] + w10 * a[i + 1] + w01 * b[i] + w11 * b[i + 1];
+    }
+  }
+};
+
+LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress) {
+  require(isFinite(towards) && length(towards) > 0,
+          "light: the direction towards it must be finite and not zero");
+  const BrickGrid& grid = volume.density();
+  const Sweep sweep(grid, grid.worldToIndex.linear * normalize(towards));
+  Mat3f shear;
+  shear(0, sweep.u) = shear(1, sweep.v) = shear(2, sweep.w) = 1;
+  shear(0, sweep.w) = -sweep.slopeU;
+  shear(1, sweep.w) = -sweep.slopeV;
+  worldToLattice_ = {shear * grid.worldToIndex.linear, shear * grid.worldToIndex.translation};
+  values_.assign(kVolume, 0.0f);
+  if (volume.isEmpty()) return;
+
+  findBricks(volume, sweep);
+  parallelFor(
+      std::size_t(brickCount_.x) * brickCount_.y, 4,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t column = begin; column != end; ++column) fillColumn(sweep, column);
+      },
+      progress);
+}
+
+// Numbers the bricks of the lattice that a density brick reaches: along the light just its own, across as far
+// as the shear within it takes.
+void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
+  const auto reach = [&](const Vec3i& brick, int axis, float slope, int& first, int& last) {
+    const float a = -slope * float(brick[sweep.w] * kBrick);
+    const float b = -slope * float((brick[sweep.w] + 1) * kBrick);
+    // A node more, for the differences there, and a little for the rounding of look-ups.
+    constexpr float slack = 1.01f;
+    first = int(std::floor((float(brick[axis] * kBrick) + std::min(a, b) - slack) / kBrick));
+    last = int(std::floor((float((brick[axis] + 1) * kBrick) + std::max(a, b) + slack) / kBrick));
+  };
+  std::vector<std::array<Vec3i, 2>> reached;
+  reached.reserve(volume.occupiedBricks().size());
+  Vec3i low{1 << 30, 1 << 30, 1 << 30}, high = -low;
+  for (const Vec3i& brick : volume.occupiedBricks()) {
+    auto& [first, last] = reached.emplace_back();
+    reach(brick, sweep.u, sweep.slopeU, first.x, last.x);
+    reach(brick, sweep.v, sweep.slopeV, first.y, last.y);
+    first.z = last.z = brick[sweep.w];
+    low = min(low, first);
+    high = max(high, last);
+  }
+  firstBrick_ = low;
+  brickCount_ = high - low + Vec3i{1, 1, 1};
+  table_.assign(std::size_t(brickCount_.x) * brickCount_.y * brickCount_.z, 0);
+  for (const auto& [first, last] : reached)
+    for (int j = first.y; j <= last.y; ++j)
+      for (int i = first.x; i <= last.x; ++i)
+        table_[(std::size_t(first.z - low.z) * brickCount_.y + std::size_t(j - low.y)) * brickCount_.x +
+               std::size_t(i - low.x)] = 1;
+  std::int32_t pool = 0;
+  for (std::int32_t& brick : table_)
+    if (brick) brick = ++pool;
+  detail::resizeLarge(values_, std::size_t(pool + 1) * kVolume);
+}
+
+// Sums the density down one column of bricks, from the light on.
+void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
+  const std::size_t across = std::size_t(brickCount_.x) * brickCount_.y;
+  const int u0 = (firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick - 1;
+  const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick - 1;
+  const int down = sweep.fromAbove ? -1 : 1;
+  const auto poolAt = [&](int n) {
+    return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
+  };
+  alignas(64) Nodes sum{}, before{}, after{}, density{}, nextDensity{}, halfHere{}, halfNext{};
+  Patch here, next;
+  for (int n = 0; n != brickCount_.z;) {
+    if (!poolAt(n)) {
+      ++n;
+      continue;
+    }
+    int end = n;
+    while (end != brickCount_.z && poolAt(end)) ++end;
+    // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
+    const int slices = (end - n) * kBrick;
+    int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
+    before.fill(0.0f);
+    sweep.load(u0, v0, k, here);
+    sweep.interpolate(here, u0, v0, float(k), density);
+    for (int slice = 0; slice <= slices; ++slice, k += down) {
+      // What the way to the next slice adds: trapezoids over half slices.
+      after.fill(0.0f);
+      if (slice < slices) {
+        sweep.load(u0, v0, k + down, next);
+        if (!here.empty || !next.empty) {
+          const float middle = float(k) + 0.5f * float(down), quarter = 0.25f * sweep.step;
+          sweep.interpolate(here, u0, v0, middle, halfHere);
+          sweep.interpolate(next, u0, v0, middle, halfNext);
+          sweep.interpolate(next, u0, v0, float(k + down), nextDensity);
+          for (std::size_t m = 0; m != kArea; ++m)
+            after[m] = quarter * ((density[m] + nextDensity[m]) + (halfHere[m] + halfNext[m]));
+          std::swap(density, nextDensity);
+        } else {
+          density.fill(0.0f);
+        }
+      }
+      const int brick = n + slice / kBrick, inside = slice % kBrick;
+      if (slice < slices) store(sweep, poolAt(brick), inside, sum, before, after);
+      if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, before, after);
+      for (std::size_t m = 0; m != kArea; ++m) sum[m] += after[m];
+      std::swap(before, after);
+      std::swap(here, next);
+    }
+    n = end;
+  }
+}
+
+// Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of
+// interpolation. `before` and `after` are what the slices beside it differ by.
+void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum,
+                        const Nodes& before, const Nodes& after) {
+  const int slice = sweep.fromAbove ? kBrick - inside : inside;
+  float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
+  for (int j = 0; j != kWidth; ++j)
+    for (int i = 0; i != kWidth; ++i) {
+      const std::size_t at = std::size_t((j + 1) * kPitch + i + 1);
+      const float across = sum[at - 1] + sum[at + 1] + sum[at - kPitch] + sum[at + kPitch] - 4 * sum[at];
+      out[j * kWidth + i] = sum[at] - (across + after[at] - before[at]) / 12;
+    }
+}
+
+float LightVolume::columnDensity(const Vec3f& world) const {
+  if (table_.empty()) return 0.0f;
+  const Vec3f p = worldToLattice_(world);
+  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+  const Vec3i brick{brickOf(cell.x), brickOf(cell.y), brickOf(cell.z)};
+  const Vec3i b = brick - firstBrick_;
+  for (int axis = 0; axis != 3; ++axis)
+    if (b[axis] < 0 || b[axis] >= brickCount_[axis]) return 0.0f;
+  const std::size_t pool = std::size_t(
+      table_[(std::size_t(b.z) * brickCount_.y + std::size_t(b.y)) * brickCount_.x + std::size_t(b.x)]);
+  const Vec3i at = cell - brick * kBrick;
+  const Vec3f f = p - Vec3f(cell);
+  float sum = 0;
+  for (int corner = 0; corner != 8; ++corner) {
+    const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+    const float weight = (dx ? f.x : 1 - f.x) * (dy ? f.y : 1 - f.y) * (dz ? f.z : 1 - f.z);
+    sum += weight *
+           values_[pool * kVolume + std::size_t(((at.z + dz) * kWidth + at.y + dy) * kWidth + at.x + dx)];
+  }
+  return sum;
+}
+
+double LightVolume::estimateBytes(const RenderVolume& volume) {
+  // Sheared by 45 degrees both ways, a brick reaches into at most 3 x 3; bricks side by side share all but
+  // the rim.
+  const Vec3f size = volume.indexBounds().isEmpty() ? Vec3f{} : volume.indexBounds().size() * (1.0f / kBrick);
+  double box = 0;
+  for (int w = 0; w != 3; ++w)
+    box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
+  const double bricks = std::min(9.0 * double(volume.occupiedBricks().size()), box);
+  return bricks * kVolume * sizeof(float) + box * sizeof(std::int32_t);
+}
+
+}  // namespace nephele

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "modeling/progress.h"
+#include "render/render_volume.h"
+
+namespace nephele {
+
+/// How much density lies between every point of a volume and a distant light, on a lattice whose third axis
+/// runs along the light.
+///
+/// Holds  c(x) = integral of density from x towards the light,  so that light reaches x times exp(-extinction
+/// c(x)). It is smooth where the light is not: interpolated linearly it errs by O(h^2) however opaque a voxel
+/// is. Known wherever the volume holds density, and not outside. Nodes are as far apart as the density's
+/// voxels.
+class LightVolume {
+ public:
+  static constexpr int kBrick = 8;
+  static constexpr int kWidth = kBrick + 1;
+  static constexpr int kVolume = kWidth * kWidth * kWidth;
+
+  /// @param towards world-space direction towards the light, not zero.
+  /// Cost: one sample of density per node of the bricks that hold density, one sweep, no march.
+  /// @throws Error if `towards` is zero or not finite.
+  LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent());
+
+  /// From world space to this lattice, whose nodes are integers.
+  const Affine& worldToLattice() const { return worldToLattice_; }
+  Vec3i firstBrick() const { return firstBrick_; }
+  Vec3i brickCount() const { return brickCount_; }
+  /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros.
+  const std::vector<std::int32_t>& table() const { return table_; }
+  /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells.
+  const std::vector<float>& values() const { return values_; }
+
+  /// c at a world-space point. Slow; for tests.
+  float columnDensity(const Vec3f& world) const;
+  std::size_t memoryBytes() const {
+    return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t);
+  }
+
+  /// Upper bound of the bytes that a light volume of `volume` takes, whatever the direction.
+  static double estimateBytes(const RenderVolume& volume);
+
+ private:
+  struct Sweep;
+  struct Nodes;
+  struct Patch;
+
+  void findBricks(const RenderVolume& volume, const Sweep& sweep);
+  void fillColumn(const Sweep& sweep, std::size_t column);
+  void store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum, const Nodes& before,
+             const Nodes& after);
+
+  Affine worldToLattice_;
+  Vec3i firstBrick_, brickCount_;
+  std::vector<std::int32_t> table_;
+  std::vector<float> values_;
+};
+
+}  // namespace nephele

@@ -1,0 +1,172 @@
+// What a marcher needs to know about a density before the first ray.
+//
+// Empty space: for every brick the Chebyshev distance to the nearest occupied one. It is exact after one
+// forward and one backward pass per axis, since the distance is a maximum over axes and the passes take it
+// one axis at a time: the minimum over y of max(|y|, d(y)) only needs d to be known along the axes done
+// before. A ray then leaves whole boxes of empty bricks in one step, so that its cost follows what is there
+// and not how finely the box around it is divided.
+//
+// Bounds: a brick whose six neighbours are full lies inside the hull of the rest, so only the others are
+// looked into.
+#include "render/render_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "modeling/error.h"
+#include "modeling/parallel.h"
+
+namespace nephele {
+
+namespace {
+// Bricks that a ray may leave behind at once; more would cost the passes more than it saves the rays.
+constexpr std::uint8_t kFarthest = 32;
+}  // namespace
+
+RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density) : density_(std::move(density)) {
+  require(density_ != nullptr, "render volume: no density given");
+  const BrickGrid& grid = *density_;
+  require(
+      grid.background == 0.0f,
+      fmt::format("density: expected 0 outside of the volume, but its background is {}", grid.background));
+  require(grid.values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+          fmt::format(
+              "density: {} distinct bricks are more than the {} that can be marched; use a larger voxel size",
+              grid.poolSize(), std::numeric_limits<std::int32_t>::max() / BrickGrid::kVolume));
+  for (const Interval& range : grid.ranges)
+    require(std::isfinite(range.min) && std::isfinite(range.max),
+            "density: contains values that are not finite");
+  findOccupied();
+  if (isEmpty()) return;
+  measureEmptiness();
+  measureBounds();
+}
+
+void RenderVolume::findOccupied() {
+  const BrickGrid& grid = *density_;
+  std::size_t entry = 0;
+  for (int z = 0; z < grid.brickCount.z; ++z)
+    for (int y = 0; y < grid.brickCount.y; ++y)
+      for (int x = 0; x < grid.brickCount.x; ++x, ++entry) {
+        const float most = grid.ranges[std::size_t(grid.table[entry])].max;
+        if (!(most > 0)) continue;
+        occupied_.push_back(grid.firstBrick + Vec3i{x, y, z});
+        maxDensity_ = std::max(maxDensity_, most);
+      }
+}
+
+void RenderVolume::measureEmptiness() {
+  const BrickGrid& grid = *density_;
+  emptiness_.assign(grid.table.size(), kFarthest);
+  for (const Vec3i& brick : occupied_) emptiness_[grid.tableIndex(brick)] = 0;
+
+  const Vec3i n = grid.brickCount;
+  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
+  for (int axis = 0; axis != 3; ++axis) {
+    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
+    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
+      std::vector<int> line(along), nearest(along);
+      for (std::size_t j = begin; j != end; ++j)
+        for (int i = 0; i != n[a]; ++i) {
+          std::uint8_t* start = emptiness_.data() + j * stride[b] + std::size_t(i) * stride[a];
+          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
+          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
+          // can improve.
+          for (int k = 0; k != along; ++k) {
+            int best = line[k];
+            for (int step = 1; step < best; ++step) {
+              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
+              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
+            }
+            nearest[k] = best;
+          }
+          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
+        }
+    });
+  }
+}
+
+void RenderVolume::measureBounds() {
+  const BrickGrid& grid = *density_;
+  constexpr int brickSize = BrickGrid::kBrick;
+  Vec3i low = occupied_.front(), high = occupied_.front();
+  for (const Vec3i& brick : occupied_) low = min(low, brick), high = max(high, brick);
+  indexBounds_ = {Vec3f(low * brickSize), Vec3f((high + Vec3i{1, 1, 1}) * brickSize)};
+
+  const auto isFull = [&](const Vec3i& brick) {
+    return grid.ranges[std::size_t(grid.poolIndex(brick))].min > 0;
+  };
+  std::vector<Vec3i> border;
+  for (const Vec3i& brick : occupied_) {
+    bool inside = true;
+    for (int axis = 0; axis != 3 && inside; ++axis)
+      for (const int side : {-1, 1}) {
+        Vec3i next = brick;
+        next[axis] += side;
+        inside = inside && isFull(next);
+      }
+    if (!inside) border.push_back(brick);
+  }
+
+  std::vector<Box> boxes(border.size());
+  parallelFor(border.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const float* values = grid.brick(grid.poolIndex(border[i]));
+      Box box;
+      for (int z = 0; z <= brickSize; ++z)
+        for (int y = 0; y <= brickSize; ++y)
+          for (int x = 0; x <= brickSize; ++x) {
+            const int at = ((z + 1) * BrickGrid::kWidth + y + 1) * BrickGrid::kWidth + x + 1;
+            if (values[at] > 0) box = box.including(Vec3f(border[i] * brickSize + Vec3i{x, y, z}));
+          }
+      // Interpolation carries density to the voxel beyond.
+      if (!box.isEmpty()) boxes[i] = box.expanded(1.0f);
+    }
+  });
+  for (const Box& box : boxes) {
+    if (box.isEmpty()) continue;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3f p{corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                    corner & 4 ? box.max.z : box.min.z};
+      outline_.push_back(grid.indexToWorld(p));
+      worldBounds_ = worldBounds_.including(outline_.back());
+    }
+  }
+}
+
+float RenderVolume::typicalDensity() const {
+  struct Sums {
+    double density = 0, squares = 0;
+  };
+  std::vector<Sums> bricks(occupied_.size());
+  parallelFor(occupied_.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const float* values = density_->brick(density_->poolIndex(occupied_[i]));
+      for (int z = 0; z != BrickGrid::kBrick; ++z)
+        for (int y = 0; y != BrickGrid::kBrick; ++y) {
+          float sum = 0, squares = 0;
+          for (int x = 0; x != BrickGrid::kBrick; ++x) {
+            const float value = std::max(values[sampleOffset(x, y, z)], 0.0f);
+            sum += value;
+            squares += value * value;
+          }
+          bricks[i].density += double(sum);
+          bricks[i].squares += double(squares);
+        }
+    }
+  });
+  // Added in a fixed order, so that the sum does not depend on the threads.
+  Sums total;
+  for (const Sums& brick : bricks) total = {total.density + brick.density, total.squares + brick.squares};
+  return total.density > 0 ? float(total.squares / total.density) : 0.0f;
+}
+
+std::size_t RenderVolume::memoryBytes() const {
+  return density_->memoryBytes() + emptiness_.size() + occupied_.size() * sizeof(Vec3i) +
+         outline_.size() * sizeof(Vec3f);
+}
+
+}  // namespace nephele

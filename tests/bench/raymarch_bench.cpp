@@ -1,0 +1,103 @@
+// Marching, per sample: vectors against the scalar loop, by extinction; and how light and marching grow with
+// the bricks that hold anything while the box around them grows with their cube.
+
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+
+#include "render/light_volume.h"
+#include "render/march_kernels.h"
+#include "render/raymarch.h"
+#include "tests/support/density.h"
+
+namespace nephele {
+namespace {
+
+// A bumpy ball across `resolution` voxels, hollow, so that its bricks grow with the square of the resolution.
+std::shared_ptr<BrickGrid> shell(int resolution) {
+  const int n = resolution / 2;
+  return test::densityGrid(test::voxels(1.0f / float(n)), {-n, -n, -n}, {n, n, n}, [](const Vec3f& p) {
+    const float r = length(p) + 0.1f * std::sin(9 * p.x) * std::sin(8 * p.y) * std::sin(7 * p.z);
+    return std::fmin(std::fmax(30 * (0.05f - std::fabs(r - 0.8f)), 0.0f), 1.0f);
+  });
+}
+
+// Rays of a 64 x 64 picture through a shell, for the kernels alone.
+struct Rays {
+  std::shared_ptr<const BrickGrid> grid = shell(128);
+  RenderVolume volume{grid};
+  LightVolume light{volume, {0.3f, 0.8f, 0.4f}};
+  MarchScene scene;
+  std::vector<MarchRay> rays;
+  std::vector<MarchResult> results;
+
+  explicit Rays(float extinction) {
+    scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
+    scene.ranges = grid->ranges.data();
+    scene.emptiness = volume.emptiness().data();
+    scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
+    scene.octaves = 8;
+    scene.extinction = extinction;
+    scene.step = scene.uniformStep = grid->voxelSize;
+    scene.leastStep = grid->voxelSize / 8;
+    for (int i = 0; i != 64 * 64; ++i) {
+      const Vec3f origin{float(i % 64) / 32 - 1, float(i / 64) / 32 - 1, -1.0f},
+          direction = normalize(Vec3f{0.1f, 0.05f, 1});
+      const auto in = [&](const Affine& map, const Vec3i& first) {
+        return LatticeRay{map(origin) - Vec3f(first * 8), map.linear * direction};
+      };
+      MarchRay& ray = rays.emplace_back();
+      ray.density = in(grid->worldToIndex, grid->firstBrick);
+      ray.suns[0] = in(light.worldToLattice(), light.firstBrick());
+      ray.length = 2;
+      for (int n = 0; n != 8; ++n) ray.weight[0][0][n] = 0.1f;
+    }
+    results.resize(rays.size());
+  }
+};
+
+template <class March>
+void march(benchmark::State& state, March&& kernel) {
+  Rays rays(float(state.range(0)));
+  std::int64_t samples = 0;
+  for (auto _ : state) {
+    kernel(rays.scene, rays.rays, rays.results);
+    for (const MarchResult& result : rays.results) samples += result.samples;
+  }
+  state.SetItemsProcessed(samples);
+}
+
+void marchVectors(benchmark::State& state) {
+  march(state, marchRays);
+}
+void marchScalar(benchmark::State& state) {
+  march(state, marchRaysScalar);
+}
+BENCHMARK(marchVectors)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
+BENCHMARK(marchScalar)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
+
+// Items: bricks that hold density.
+void sunOfAShell(benchmark::State& state) {
+  const RenderVolume volume(shell(int(state.range(0))));
+  for (auto _ : state) benchmark::DoNotOptimize(LightVolume(volume, {0.3f, 0.8f, 0.4f}));
+  state.SetItemsProcessed(state.iterations() * std::int64_t(volume.occupiedBricks().size()));
+}
+BENCHMARK(sunOfAShell)->Arg(64)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void pictureOfAShell(benchmark::State& state) {
+  const RenderVolume volume(shell(int(state.range(0))));
+  Medium medium;
+  medium.extinction = defaultExtinction(volume);
+  const Lights lights{{{}}, {0.1f, 0.2f, 0.3f}};
+  const Camera camera = Camera::framing(volume.outline(), 20, 10, {320, 240, 35});
+  std::int64_t samples = 0;
+  for (auto _ : state) samples += std::int64_t(renderImage(volume, medium, lights, camera).samples);
+  state.SetItemsProcessed(samples);
+  state.counters["occupied_bricks"] = double(volume.occupiedBricks().size());
+}
+BENCHMARK(pictureOfAShell)->Arg(64)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace nephele
+
+BENCHMARK_MAIN();

@@ -1,0 +1,81 @@
+#include "render/march_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "render/light_volume.h"
+#include "render/render_volume.h"
+#include "tests/support/density.h"
+#include "tests/support/each_target.h"
+
+namespace nephele {
+namespace {
+
+LatticeRay through(const Affine& map, const Vec3i& firstBrick, const Vec3f& origin, const Vec3f& direction) {
+  return {map(origin) - Vec3f(firstBrick * 8), map.linear * direction};
+}
+
+TEST(MarchKernels, AgreeWithTheScalarLoop) {
+  const auto grid = test::densityGrid(test::voxels(0.1f), {-20, -20, -20}, {20, 20, 20}, [](const Vec3f& p) {
+    return std::fmax(0.0f, std::sin(3 * p.x) * std::cos(4 * p.y) + std::sin(5 * p.z));
+  });
+  const RenderVolume volume(grid);
+  const LightVolume light(volume, {0.3f, 0.8f, 0.4f});
+  std::vector<float> sky(5 * 4 * 3);
+  for (std::size_t i = 0; i != sky.size(); ++i) sky[i] = 0.5f + 0.4f * std::sin(float(i));
+  const Affine toSky{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
+
+  MarchScene scene;
+  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
+  scene.ranges = grid->ranges.data();
+  scene.emptiness = volume.emptiness().data();
+  scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
+  scene.sky = sky.data();
+  scene.skySize = {5, 4, 3};
+  scene.octaves = 5;
+  scene.colours = 3;
+  scene.step = 0.1f;
+  scene.leastStep = 0.0125f;
+
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != 300; ++i) {
+    const Vec3f direction = normalize(Vec3f{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)});
+    const Vec3f origin =
+        Vec3f{std::sin(i * 0.9f), std::cos(i * 1.9f), std::sin(i * 0.4f)} * 0.8f - direction * 1.2f;
+    MarchRay ray;
+    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, direction);
+    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, direction);
+    ray.sky = through(toSky, {}, origin, direction);
+    ray.length = 2.5f;
+    ray.jitter = 0.3f;
+    for (int c = 0; c != 3; ++c)
+      for (int n = 0; n != 5; ++n) ray.weight[0][c][n] = 0.1f * float(c + 1) / float(n + 1);
+    rays.push_back(ray);
+  }
+  for (const float extinction : {0.05f, 2.0f, 40.0f}) {
+    scene.extinction = extinction;
+    std::vector<MarchResult> expected(rays.size());
+    marchRaysScalar(scene, rays, expected);
+    test::forEachTarget([&] {
+      std::vector<MarchResult> results(rays.size());
+      marchRays(scene, rays, results);
+      for (std::size_t i = 0; i != rays.size(); ++i) {
+        // The vectors notice only every 16 samples that nothing is left to see.
+        const float seen = std::exp(-expected[i].opticalDepth);
+        ASSERT_NEAR(std::exp(-results[i].opticalDepth), seen, 1.1e-4f);
+        ASSERT_NEAR(results[i].sky, expected[i].sky, 2e-4f);
+        ASSERT_EQ(std::isinf(results[i].distance), std::isinf(expected[i].distance));
+        if (std::isfinite(results[i].distance)) {
+          ASSERT_NEAR(results[i].distance, expected[i].distance, 1e-4f);
+        }
+        for (int c = 0; c != 3; ++c)
+          ASSERT_NEAR(results[i].suns[0][c], expected[i].suns[0][c], 2e-4f) << i << " " << c;
+      }
+    });
+  }
+}
+
+}  // namespace
+}  // namespace nephele
