@@ -1,0 +1,177 @@
+#include "apps/app.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <new>
+
+#include "apps/config_file.h"
+#include "apps/program_run.h"
+#include "levelset/output_file.h"
+
+namespace nephele::apps {
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kUsage = 2;
+
+std::string quoted(const std::string& argument) {
+  const bool plain =
+      !argument.empty() && argument.find_first_of(" \t\n'\"\\$*?&;|<>()#") == std::string::npos;
+  if (plain) return argument;
+  std::string result = "'";
+  for (const char c : argument) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
+std::string commandLineOf(int argc, char** argv) {
+  std::string line = "nephele";
+  for (int i = 1; i < argc; ++i) line += " " + quoted(argv[i]);
+  return line;
+}
+
+void addCommonOptions(CLI::App& app, CommonOptions& options) {
+  const std::string group = "Common to all verbs";
+  addCount(app, "--threads", options.threads, 0, 4096, "Threads to use; 0: all that the process may use.")
+      ->group(group);
+  app.add_flag("--quiet", options.quiet, "Print errors only.")->group(group);
+  app.add_flag("--verbose", options.verbose, "Print the time of every stage.")->group(group);
+  app.add_option("--config", options.config, "Read options by name from a TOML file; the command line wins.")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--stats", options.stats, "Write statistics as one JSON object.")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--progress", options.progress, "auto, or alf for lines that farm software reads.")
+      ->check(CLI::IsMember({"auto", "alf"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--memory-limit", options.memoryLimit,
+                 "Refuse work that needs more: 8G, 512M or a share of memory.")
+      ->capture_default_str()
+      ->group(group);
+  app.add_flag("--overwrite", options.overwrite, "Replace outputs that exist; this is the default.")
+      ->group(group);
+}
+
+void writeStatistics(const std::string& path, const nlohmann::json& statistics) {
+  OutputFile output(path);
+  std::ofstream file(output.temporaryPath());
+  file << statistics.dump(2) << '\n';
+  file.close();
+  require(file.good(), fmt::format("{}: could not be written", path));
+  output.commit();
+}
+
+std::vector<std::string> optionNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group :
+       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    for (const std::string& name : optionNames(*group)) names.push_back(name);
+  return names;
+}
+
+int usageError(const std::string& who, const std::string& what) {
+  std::cerr << who << ": error: " << what << "\nTry '" << who << " --help'.\n";
+  return kUsage;
+}
+
+int runBody(const Verb& verb, ProgramRun& run, const CommonOptions& options) {
+  const std::string who = "nephele " + verb.name;
+  try {
+    verb.body(run);
+    run.finish();
+    if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
+    std::cout.flush();
+    require(std::fflush(stdout) == 0, "the standard output could not be written");
+    return 0;
+  } catch (const Cancelled&) {
+    run.finish();
+    std::cerr << who << ": stopped; no partial output was left\n";
+    return stopSignal() != 0 ? 128 + stopSignal() : kFailed;
+  } catch (const CLI::Error& error) {
+    run.finish();
+    return usageError(who, error.what());
+  } catch (const std::bad_alloc&) {
+    run.finish();
+    std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
+  } catch (const std::exception& error) {
+    run.finish();
+    std::cerr << who << ": error: " << error.what() << '\n';
+  }
+  return kFailed;
+}
+
+int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::string& commandLine) {
+  CLI::App app(verb.summary, "nephele " + verb.name);
+  app.footer("Example:\n  " + verb.example);
+  app.get_formatter()->column_width(34);
+  // Collected, so that a suggestion can be made for each.
+  app.allow_extras();
+  CommonOptions options;
+  verb.bind(app);
+  addCommonOptions(app, options);
+
+  const std::string who = "nephele " + verb.name;
+  try {
+    arguments = withConfigFile(app, std::move(arguments));
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(std::move(arguments));
+    for (const std::string& extra : app.remaining()) {
+      if (!extra.starts_with('-'))
+        return usageError(who, fmt::format("'{}' is one argument too many", extra));
+      const std::string meant = closestWord(extra.substr(0, extra.find('=')), optionNames(app));
+      return usageError(who, fmt::format("unknown option '{}'{}", extra,
+                                         meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
+    }
+    ProgramRun run(verb.name, options);
+    run.commandLine = commandLine;
+    const std::size_t threads =
+        options.threads > 0 ? std::size_t(options.threads)
+                            : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return runBody(verb, run, options);
+  } catch (const CLI::CallForHelp&) {
+    std::cout << app.help();
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return usageError(who, error.what());
+  }
+}
+
+std::string overview(const std::vector<Verb>& verbs) {
+  std::string text = "Nephele: clouds and level sets.\nUsage: nephele VERB [OPTIONS]\n\nVerbs:\n";
+  for (const Verb& verb : verbs) text += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
+  return text + "\n'nephele VERB --help' explains a verb; 'nephele --version' prints the version.\n";
+}
+
+}  // namespace
+
+int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
+  installSignalHandlers();
+  const std::string word = argc > 1 ? argv[1] : "--help";
+  if (word == "--help" || word == "-h" || word == "help") {
+    std::cout << overview(verbs);
+    return argc > 1 ? 0 : kUsage;
+  }
+  if (word == "--version") {
+    std::cout << "nephele " << NEPHELE_VERSION << '\n';
+    return 0;
+  }
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs) {
+    if (verb.name == word)
+      return runVerb(verb, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
+    names.push_back(verb.name);
+  }
+  const std::string meant = closestWord(word, names);
+  return usageError("nephele", fmt::format("unknown verb '{}'{}", word,
+                                           meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/options.h"
+#include "modeling/progress.h"
+
+namespace nephele::apps {
+
+/// What the body of a verb works with: progress, statistics, limits. One per run of the program.
+class Run : public Progress {
+ public:
+  /// The statistics object written to --stats; `command`, `version`, `seconds`, `peak_memory_bytes` and
+  /// `stages` are filled in by the program, the rest by the verb.
+  nlohmann::json stats = nlohmann::json::object();
+
+  /// The command line as typed, for file metadata.
+  std::string commandLine;
+
+  /// Metadata that every output carries: creator, version, command line.
+  std::map<std::string, std::string> metadata() const;
+
+  /// Refuses work that needs more than --memory-limit.
+  /// @throws Error naming the estimate, the limit and `remedy` (the option to change).
+  void requireMemory(double estimatedBytes, const std::string& remedy) const;
+
+  /// A line of result on stdout.
+  virtual void result(const std::string& line) const = 0;
+
+  double memoryLimitBytes = 0;
+};
+
+/// One verb of the program.
+struct Verb {
+  std::string name;
+  std::string summary;
+  /// One worked command line, shown by --help.
+  std::string example;
+  /// Declares the verb's options, bound to variables that the body shares.
+  std::function<void(CLI::App&)> bind;
+  std::function<void(Run&)> body;
+};
+
+Verb levelsetVerb();
+Verb cloudVerb();
+Verb meshVerb();
+Verb renderVerb();
+Verb infoVerb();
+
+/// Parses the command line, runs one verb, and returns the exit code: 0 success, 1 failed, 2 usage, 128 +
+/// signal where a signal stopped it.
+int runProgram(int argc, char** argv, const std::vector<Verb>& verbs);
+
+}  // namespace nephele::apps

@@ -1,0 +1,208 @@
+#include "apps/program_run.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+
+#include "levelset/output_file.h"
+#include "modeling/error.h"
+
+namespace nephele::apps {
+namespace {
+
+volatile std::sig_atomic_t receivedSignal = 0;
+
+extern "C" void onStopSignal(int signal) {
+  if (receivedSignal != 0) {
+    discardAllOutputs();
+    _exit(128 + signal);
+  }
+  receivedSignal = signal;
+}
+
+double physicalMemory() {
+  return double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
+}
+
+// What the process may use: the machine's memory, or less where a control group or a resource limit says so.
+double allowedMemory() {
+  double bytes = physicalMemory();
+  for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    std::ifstream file(path);
+    double limit = 0;
+    if (file >> limit && limit > 0) bytes = std::min(bytes, limit);
+  }
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+    bytes = std::min(bytes, double(limit.rlim_cur));
+  return bytes;
+}
+
+double peakMemory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return double(usage.ru_maxrss) * 1024;
+}
+
+std::string inUnits(double bytes) {
+  return bytes >= 1e9 ? fmt::format("{:.1f} GB", bytes / 1e9) : fmt::format("{:.0f} MB", bytes / 1e6);
+}
+
+}  // namespace
+
+void installSignalHandlers() {
+  std::signal(SIGINT, onStopSignal);
+  std::signal(SIGTERM, onStopSignal);
+  // A full file or a closed pipe is then an error of the write, which is reported, not a silent death.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+int stopSignal() {
+  return receivedSignal;
+}
+
+double parseMemoryLimit(const std::string& text) {
+  double value = 0;
+  char unit = 0, rest = 0;
+  const int fields = std::sscanf(text.c_str(), "%lf%c%c", &value, &unit, &rest);
+  double factor = 0;
+  if (fields == 2) {
+    if (unit == '%') factor = allowedMemory() / 100;
+    if (unit == 'M' || unit == 'm') factor = 1e6;
+    if (unit == 'G' || unit == 'g') factor = 1e9;
+  }
+  if (factor == 0 || !std::isfinite(value) || value <= 0)
+    throw CLI::ValidationError("--memory-limit",
+                               fmt::format("got '{}', allowed: a size such as 8G, 512M or 80%", text));
+  return value * factor;
+}
+
+std::map<std::string, std::string> Run::metadata() const {
+  return {{"creator", "nephele"}, {"version", NEPHELE_VERSION}, {"command_line", commandLine}};
+}
+
+void Run::requireMemory(double estimatedBytes, const std::string& remedy) const {
+  require(estimatedBytes <= memoryLimitBytes,
+          fmt::format("this needs about {} of memory and may use {}; {} or raise --memory-limit",
+                      inUnits(estimatedBytes), inUnits(memoryLimitBytes), remedy));
+}
+
+ProgramRun::ProgramRun(std::string verb, const CommonOptions& options)
+    : verb_(std::move(verb)), options_(options), terminal_(isatty(STDERR_FILENO) != 0) {
+  memoryLimitBytes = parseMemoryLimit(options.memoryLimit);
+}
+
+void ProgramRun::begin(std::string_view stage) const {
+  const std::lock_guard lock(mutex_);
+  endStage();
+  stage_ = stage;
+  stageStart_ = Clock::now();
+  stages_.push_back({{"name", stage_}});
+}
+
+void ProgramRun::count(std::string_view name, double value) const {
+  const std::lock_guard lock(mutex_);
+  if (!stages_.empty()) stages_.back()[std::string(name)] = value;
+}
+
+void ProgramRun::endStage() const {
+  if (stage_.empty()) return;
+  const double seconds = std::chrono::duration<double>(Clock::now() - stageStart_).count();
+  stages_.back()["seconds"] = seconds;
+  stages_.back()["peak_memory_bytes"] = peakMemory();
+  clearBar();
+  const bool slow = seconds >= 2;
+  if (options_.verbose || (slow && !options_.quiet && !terminal_))
+    fmt::print(stderr, "nephele {}: {}: {:.2f} s\n", verb_, stage_, seconds);
+  stage_.clear();
+}
+
+void ProgramRun::advance(double fraction) const {
+  const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - start_).count();
+  auto last = lastDrawn_.load(std::memory_order_relaxed);
+  if (now - last < 100 || !lastDrawn_.compare_exchange_strong(last, now)) return;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (lock.owns_lock()) draw(std::clamp(fraction, 0.0, 1.0));
+}
+
+void ProgramRun::draw(double fraction) const {
+  if (options_.progress == "alf") {
+    // Stages are not known ahead, so the whole is taken to approach its end with each of them.
+    const double whole = 1 - std::pow(0.5, double(stages_.size()) - 1 + fraction);
+    const int percent = int(whole * 100);
+    if (percent > farmPercent_) {
+      farmPercent_ = percent;
+      fmt::print("ALF_PROGRESS {}%\n", percent);
+      std::fflush(stdout);
+    }
+    return;
+  }
+  if (options_.quiet || stage_.empty()) return;
+  const double seconds = std::chrono::duration<double>(Clock::now() - stageStart_).count();
+  if (seconds < 0.5) return;
+  const double left = fraction > 0 ? seconds * (1 - fraction) / fraction : 0;
+  if (terminal_) {
+    constexpr int kWidth = 30;
+    const int filled = int(fraction * kWidth);
+    fmt::print(stderr, "\r\033[K{} [{}{}] {:3.0f} %  {:.1f} %/s  {:.0f} s left", stage_,
+               std::string(filled, '#'), std::string(kWidth - filled, '.'), fraction * 100,
+               fraction * 100 / seconds, left);
+    std::fflush(stderr);
+    barShown_ = true;
+  } else if (const auto now = lastDrawn_.load(); seconds >= 2 && now - lastLine_ >= 5000) {
+    lastLine_ = now;
+    fmt::print(stderr, "nephele {}: {}: {:.0f} %, {:.0f} s left\n", verb_, stage_, fraction * 100, left);
+  }
+}
+
+void ProgramRun::clearBar() const {
+  if (!barShown_) return;
+  fmt::print(stderr, "\r\033[K");
+  std::fflush(stderr);
+  barShown_ = false;
+}
+
+void ProgramRun::note(std::string_view message) const {
+  if (options_.quiet) return;
+  const std::lock_guard lock(mutex_);
+  clearBar();
+  fmt::print(stderr, "nephele {}: {}\n", verb_, message);
+}
+
+bool ProgramRun::cancelled() const {
+  return receivedSignal != 0;
+}
+
+void ProgramRun::result(const std::string& line) const {
+  if (options_.quiet) return;
+  const std::lock_guard lock(mutex_);
+  clearBar();
+  fmt::print("{}\n", line);
+}
+
+void ProgramRun::finish() const {
+  const std::lock_guard lock(mutex_);
+  endStage();
+  if (options_.progress == "alf") {
+    fmt::print("ALF_PROGRESS 100%\n");
+    std::fflush(stdout);
+  }
+}
+
+nlohmann::json ProgramRun::statistics() const {
+  nlohmann::json all = {{"command", commandLine}, {"version", NEPHELE_VERSION}};
+  all["seconds"] = std::chrono::duration<double>(Clock::now() - start_).count();
+  all["peak_memory_bytes"] = peakMemory();
+  all["stages"] = stages_;
+  all.update(stats);
+  return all;
+}
+
+}  // namespace nephele::apps

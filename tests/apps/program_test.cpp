@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_program.h"
+
+namespace nephele::test {
+namespace {
+
+const std::string kMesh = ownData("data/sphere_uv.obj");
+
+TEST(Program, PrintsItsVersionAndVerbs) {
+  EXPECT_EQ(runProgram("--version").exitCode, 0);
+  const ProgramResult help = runProgram("--help");
+  EXPECT_EQ(help.exitCode, 0);
+  for (const char* verb : {"levelset", "cloud", "mesh", "render", "info"})
+    EXPECT_NE(help.output.find(verb), std::string::npos) << verb;
+}
+
+TEST(Program, HelpOfEveryVerbShowsAnExample) {
+  for (const std::string verb : {"levelset", "cloud", "mesh", "render", "info"}) {
+    const ProgramResult help = runProgram(verb + " --help");
+    EXPECT_EQ(help.exitCode, 0) << verb;
+    EXPECT_NE(help.output.find("Example:\n  nephele " + verb), std::string::npos) << help.output;
+    EXPECT_NE(help.output.find("--stats"), std::string::npos) << verb;
+  }
+}
+
+TEST(Program, WithoutAVerbIsAUsageError) {
+  EXPECT_EQ(runProgram("").exitCode, 2);
+}
+
+TEST(Program, UnknownVerbIsAUsageErrorWithASuggestion) {
+  const ProgramResult result = runProgram("levelst x.obj");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_NE(result.errors.find("did you mean 'levelset'"), std::string::npos) << result.errors;
+}
+
+TEST(Program, UnknownOptionIsAUsageErrorWithASuggestion) {
+  const ProgramResult result = runProgram("levelset in.obj -o out.vdb --resolutoin 12");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_NE(result.errors.find("--resolution"), std::string::npos) << result.errors;
+}
+
+TEST(Program, WrongValueNamesOptionValueAndRange) {
+  const ProgramResult result = runProgram("cloud in.obj -o out.vdb --layers 0");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_NE(result.errors.find("--layers"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("'0'"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("from 1"), std::string::npos) << result.errors;
+}
+
+TEST(Program, MissingInputNamesTheFile) {
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      runProgram("levelset " + folder.file("none.obj") + " -o " + folder.file("out.vdb"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("none.obj"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST(Program, MissingOutputFolderNamesThePath) {
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      runProgram("levelset " + kMesh + " --resolution 16 -o " + folder.file("none/out.vdb"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("none"), std::string::npos) << result.errors;
+}
+
+TEST(Program, UnwritableTargetIsRefused) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkdir(folder.file("out.vdb").c_str(), 0777), 0);
+  const ProgramResult result =
+      runProgram("levelset " + kMesh + " --resolution 16 -o " + folder.file("out.vdb"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_EQ(folder.entryCount(), 1u) << "no temporary file may stay";
+}
+
+// A file size limit stands in for a full disk: both make a write end short.
+TEST(Program, FullDiskLeavesNoPartialFile) {
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      runProgram("levelset " + kMesh + " --resolution 96 -o " + folder.file("out.vdb"), "ulimit -f 8;");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("out.vdb"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST(Program, InterruptLeavesNoPartialFileAndSaysSo) {
+  const TemporaryFolder folder;
+  const ProgramResult result = runProgram(
+      "cloud " + kMesh + " --resolution 1200 --layers 4 --memory-limit 16G -o " + folder.file("out.vdb"),
+      "timeout --signal=INT --preserve-status 1");
+  EXPECT_EQ(result.exitCode, 130) << result.errors;
+  EXPECT_NE(result.errors.find("stopped"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST(Program, RefusesWorkOverTheMemoryLimitBeforeDoingIt) {
+  const TemporaryFolder folder;
+  for (const std::string verb : {"levelset", "cloud"}) {
+    const ProgramResult result =
+        runProgram(verb + " " + kMesh + " --resolution 100000 -o " + folder.file("out.vdb"));
+    EXPECT_EQ(result.exitCode, 1) << verb;
+    EXPECT_NE(result.errors.find("GB"), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find("--resolution"), std::string::npos) << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST(Program, ConfigFileSetsOptionsAndTheCommandLineWins) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("options.toml")) << "resolution = 24\nhalf-width = 5\n";
+  const std::string common = "levelset " + kMesh + " -o " + folder.file("out.vdb") + " --stats " +
+                             folder.file("stats.json") + " --config " + folder.file("options.toml");
+  ASSERT_EQ(runProgram(common).exitCode, 0);
+  const double coarse = nlohmann::json::parse(textOf(folder.file("stats.json")))["grid"]["voxel_size"];
+  ASSERT_EQ(runProgram(common + " --resolution 48").exitCode, 0);
+  const double fine = nlohmann::json::parse(textOf(folder.file("stats.json")))["grid"]["voxel_size"];
+  EXPECT_NEAR(coarse / fine, 2.0, 1e-6) << "48 voxels along a side are twice as small as 24";
+}
+
+TEST(Program, ConfigFileWithAnUnknownKeyNamesItsLine) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("options.toml")) << "resolution = 24\nresolutoin = 24\n";
+  const ProgramResult result = runProgram("levelset " + kMesh + " -o " + folder.file("out.vdb") +
+                                          " --config " + folder.file("options.toml"));
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_NE(result.errors.find("options.toml:2"), std::string::npos) << result.errors;
+}
+
+TEST(Program, StatisticsHoldTheCommonFields) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(runProgram("levelset " + kMesh + " --resolution 32 -o " + folder.file("out.vdb") + " --stats " +
+                       folder.file("stats.json"))
+                .exitCode,
+            0);
+  const nlohmann::json stats = nlohmann::json::parse(textOf(folder.file("stats.json")));
+  EXPECT_NE(stats["command"].get<std::string>().find("--resolution 32"), std::string::npos);
+  EXPECT_GT(stats["seconds"].get<double>(), 0);
+  EXPECT_GT(stats["peak_memory_bytes"].get<double>(), 1e6);
+  ASSERT_FALSE(stats["stages"].empty());
+  for (const auto& stage : stats["stages"]) {
+    EXPECT_FALSE(stage["name"].get<std::string>().empty());
+    EXPECT_GE(stage["seconds"].get<double>(), 0);
+  }
+}
+
+TEST(Program, QuietPrintsNothingOnSuccess) {
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      runProgram("levelset " + kMesh + " --resolution 32 --quiet -o " + folder.file("out.vdb"));
+  EXPECT_EQ(result.exitCode, 0);
+  EXPECT_EQ(result.output + result.errors, "");
+}
+
+}  // namespace
+}  // namespace nephele::test
