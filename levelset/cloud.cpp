@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "levelset/marching_cubes.h"
+#include "levelset/mesh_distance.h"
 #include "levelset/mesh_io.h"
 #include "levelset/mesh_to_level_set.h"
 #include "modeling/error.h"
@@ -56,6 +57,7 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
                                        {.voxelSize = options.voxelSize,
                                         .box = boundingBox(mesh),
                                         .newtonSteps = options.newtonSteps,
+                                        .closestPoint = closestPoint(mesh),
                                         .medialSmoothing = options.medialSmoothing,
                                         .renormalise = options.renormalise},
                                        progress);

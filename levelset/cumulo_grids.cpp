@@ -299,7 +299,9 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
   require(!layers.empty(), "griddedCumulo: there must be at least one layer");
 
   LayerSampler sampler(layers, options, progress);
-  CumuloOptions form{.voxelSize = options.voxelSize, .newtonSteps = options.newtonSteps};
+  CumuloOptions form{.voxelSize = options.voxelSize,
+                     .newtonSteps = options.newtonSteps,
+                     .closestPoint = options.closestPoint};
   form.bake = [&](const CumuloStep& step) { return sampler(step); };
   form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options.voxelSize); };
   GriddedCumulo result;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "levelset/brick_grid.h"
@@ -23,6 +24,8 @@ struct CumuloGridOptions {
   Box box{};
   /// Newton steps towards the surface.
   int newtonSteps = 5;
+  /// See CumuloOptions::closestPoint.
+  std::optional<VectorField> closestPoint{};
   /// Voxels by which the places where displacement jumps over the medial axis grow before they are smoothed,
   /// at least two voxels of the layer's own grid; 0 leaves the jumps.
   int medialSmoothing = 4;

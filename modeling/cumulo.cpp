@@ -35,7 +35,7 @@ struct Before {
 
 class LayerNode final : public FieldNode<float> {
  public:
-  LayerNode(const CumuloStep& step, const Before& before, const SurfacePointOptions& projection)
+  LayerNode(const CumuloStep& step, const Before& before, const CumuloOptions& options)
       : surface_(step.surface.node()),
         level_(step.level.node()),
         noise_(step.layer->noise.node()),
@@ -44,8 +44,11 @@ class LayerNode final : public FieldNode<float> {
         before_(before),
         billowScale_(step.layer->billowScale),
         band_{-step.reach - step.margin, step.margin},
-        bound_(step.bound),
-        projection_(projection) {}
+        bound_(step.bound) {
+    projection_.steps = options.newtonSteps;
+    projection_.voxel = options.voxelSize;
+    if (step.index == 0) projection_.fallback = options.closestPoint;
+  }
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
     Scratch::Frame frame(scratch);
@@ -181,8 +184,6 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
           "cumulo: newtonSteps must be 1 to 64, got " + std::to_string(options.newtonSteps));
   for (std::size_t i = 0; i < layers.size(); ++i) check(layers[i], i);
 
-  const SurfacePointOptions projection{.steps = options.newtonSteps, .voxel = options.voxelSize};
-
   ScalarField sum = memo(base), surface = sum, level = sum;
   Before before;
   for (std::size_t i = 0; i < layers.size(); ++i) {
@@ -197,7 +198,7 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
     step.bound = layerBound(layer, i);
     step.reach = displacementBound(layers, i);
     step.margin = options.margin ? options.margin(i) : 4 * options.voxelSize;
-    step.displacement = ScalarField(std::make_shared<LayerNode>(step, before, projection));
+    step.displacement = ScalarField(std::make_shared<LayerNode>(step, before, options));
     if (options.bake) {
       const CumuloSampled sampled = options.bake(step);
       before = {sampled.displacement.node(), layer.amplitude.node()};

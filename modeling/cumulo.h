@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "modeling/field.h"
@@ -94,6 +95,9 @@ struct CumuloOptions {
   /// Replaces each layer by a sampled one; see levelset/cumulo_grids.h. Empty: the pure procedural form,
   /// exact and slow: (1 + 7 k)^M evaluations of the base per value for k steps and M layers.
   std::function<CumuloSampled(const CumuloStep&)> bake{};
+  /// The exact surface point of `base` near x, such as the closest point of a mesh: taken by the first layer
+  /// where the gradient of `base` vanishes before its surface is found. Empty: the best point found.
+  std::optional<VectorField> closestPoint{};
   /// Margin of the band of a layer, by its index. Empty: 4 h. A bake at a coarser voxel size needs more.
   std::function<float(std::size_t layer)> margin{};
 };

@@ -11,6 +11,7 @@
 #include "modeling/function_field.h"
 #include "modeling/noise.h"
 #include "modeling/shapes.h"
+#include "modeling/space.h"
 #include "modeling/surface_point.h"
 #include "tests/support/check_field.h"
 
@@ -267,6 +268,17 @@ TEST(Cumulo, HandsTheBakeEachLayerAndUsesWhatItReturns) {
       cumulo(sphere({}, 1), cumuloLayers({.layers = 3, .amplitude = 0.01f, .frequency = 2}), options);
   EXPECT_EQ(seen, (std::vector<std::size_t>{0, 1, 2}));
   EXPECT_FLOAT_EQ(cloud({0, 0, 0}), 4.0f);
+}
+
+// A sphere whose distance stops at -0.03: there is no gradient to follow, but the closest point is x / |x|.
+TEST(Cumulo, TakesTheClosestPointWhereTheBaseIsFlat) {
+  const ScalarField base = max(sphere({}, 1), ScalarField(-0.03f));
+  const CumuloLayer layer{
+      .noise = perlin({.frequency = 3, .seed = 5}), .amplitude = 0.05f, .billow = 0.0f, .frequency = 3};
+  const ScalarField cloud =
+      cumulo(base, {layer}, {.voxelSize = 0.01f, .closestPoint = normalize(identity())});
+  for (const Vec3f& p : {Vec3f{1.1f, 0.2f, -0.1f}, Vec3f{-0.3f, 1.2f, 0.4f}, Vec3f{0.7f, -0.8f, 0.5f}})
+    EXPECT_FLOAT_EQ(cloud(p), -0.03f + 0.05f * std::abs(layer.noise(normalize(p))));
 }
 
 TEST(Cumulo, RefusesBadOptions) {
