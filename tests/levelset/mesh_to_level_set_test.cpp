@@ -125,6 +125,18 @@ TEST(MeshToLevelSet, OverlappingPartsBecomeTheirUnion) {
   EXPECT_NEAR(enclosedVolume(grid), 8.0 / 3.0 * M_PI - 5.0 * M_PI / 12.0, 0.05);
 }
 
+// Two crossing plates a tenth of a voxel thick: that they overlap is no excuse for a volume that is not
+// theirs.
+TEST(MeshToLevelSet, OverlappingPartsTooThinForTheVoxelsAreRefused) {
+  const Mesh plates = joined(boxMesh({-1, -1, -0.01}, {1, 1, 0.01}), boxMesh({-1, -0.01, -1}, {1, 0.01, 1}));
+  try {
+    meshToLevelSet(plates, {.voxelSize = 0.2});
+    FAIL() << "a wrong volume was accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("too thin"), std::string::npos) << error.what();
+  }
+}
+
 TEST(MeshToLevelSet, SignAgreesWithOpenVdbAwayFromTheSurface) {
   const std::string path = sharedData("meshes/spot_uv.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
