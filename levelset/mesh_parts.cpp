@@ -390,16 +390,4 @@ std::vector<bool> partsToTurn(const Mesh& triangles, const MeshParts& parts) {
   return turn;
 }
 
-bool hasNestedSolids(const Mesh& triangles, const MeshParts& parts) {
-  const std::vector<PartShape> shapes = shapesOf(triangles, parts);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    if (shapes[i].volume <= 0) continue;
-    int winding = 0;
-    for (std::size_t j = 0; j < shapes.size(); ++j)
-      if (i != j) winding += containment(triangles, shapes[j], shapes[i]);
-    if (winding > 0) return true;
-  }
-  return false;
-}
-
 }  // namespace nephele::detail

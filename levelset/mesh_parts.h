@@ -53,8 +53,4 @@ double windingNumber(const Mesh& triangles, std::span<const std::uint32_t> faces
 /// which are inward parts inside others, kept. A part inside another is turned with it.
 std::vector<bool> partsToTurn(const Mesh& triangles, const MeshParts& parts);
 
-/// True if some part lies inside another one of the same orientation, so that the sum of volumes counts it
-/// twice.
-bool hasNestedSolids(const Mesh& triangles, const MeshParts& parts);
-
 }  // namespace nephele::detail

@@ -45,17 +45,12 @@ struct MeshDiagnosis {
 MeshDiagnosis diagnose(const Mesh& mesh);
 
 /// Pairs of triangles that intersect beyond what they share (exact predicates; triangles without area left
-/// out). Any soup. About 5 microseconds per triangle: for `info` and for `volumeIsDefined`.
+/// out). Any soup. About 5 microseconds per triangle: for `info`.
 std::size_t countSelfIntersections(const Mesh& mesh);
 
-/// Whether signedVolume(mesh) is the volume of what the mesh encloses: closed, no triangles that intersect,
-/// and no part inside another of the same orientation. Overlapping parts are legal solids whose overlap the
-/// sum counts twice. Slow (countSelfIntersections); ask only where the volume disagrees with another measure.
-bool volumeIsDefined(const Mesh& mesh);
-
 /// Volume of the points that a closed mesh winds around at least once: what a level set of it encloses, also
-/// where parts overlap or the surface intersects itself. For a mesh whose volume is defined it equals
-/// signedVolume, within about 1e-3 (quadrature with 1024 rays along the longest side). About 0.1 s.
+/// where parts overlap or the surface intersects itself. Without such overlaps it equals signedVolume, within
+/// about 1e-3 (quadrature with 1024 rays along the longest side). About 0.1 s.
 /// @throws Error if there are no faces.
 double solidVolume(const Mesh& mesh);
 

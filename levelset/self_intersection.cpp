@@ -81,33 +81,17 @@ class Pairs {
   std::vector<Point> points_;
 };
 
-struct Found {};
-
-// Stops at `most`.
-std::size_t countPairs(const Mesh& triangles, std::size_t most) {
-  const Pairs pairs(triangles);
-  std::vector<FaceBox> boxes = pairs.boxes();
-  std::size_t count = 0;
-  try {
-    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FaceBox& a, const FaceBox& b) {
-      if (pairs.intersect(a.info(), b.info()) && ++count == most) throw Found{};
-    });
-  } catch (const Found&) {
-  }
-  return count;
-}
-
 }  // namespace
 
 std::size_t countSelfIntersections(const Mesh& mesh) {
-  return countPairs(triangulated(detail::withMergedPositions(mesh)), static_cast<std::size_t>(-1));
-}
-
-bool volumeIsDefined(const Mesh& mesh) {
   const Mesh triangles = triangulated(detail::withMergedPositions(mesh));
-  const MeshDiagnosis diagnosis = diagnose(triangles);
-  return diagnosis.closed() && diagnosis.duplicateFaces == 0 && countPairs(triangles, 1) == 0 &&
-         !detail::hasNestedSolids(triangles, detail::findClosedParts(triangles));
+  const Pairs pairs(triangles);
+  std::vector<FaceBox> boxes = pairs.boxes();
+  std::size_t count = 0;
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const FaceBox& a, const FaceBox& b) {
+    count += pairs.intersect(a.info(), b.info());
+  });
+  return count;
 }
 
 }  // namespace nephele

@@ -53,8 +53,6 @@ std::string messageFor(const Mesh& mesh, Mode mode) {
   return "no error";
 }
 
-// ---- diagnosis of small meshes ----
-
 TEST(MeshDiagnosis, CubeIsAClosedManifold) {
   const MeshDiagnosis is = diagnose(cube());
   EXPECT_TRUE(is.manifold());
@@ -94,8 +92,6 @@ TEST(MeshDiagnosis, MeshWithoutFacesIsNotClosed) {
   EXPECT_FALSE(diagnose(Mesh{}).closed());
   EXPECT_EQ(diagnose(Mesh{}).problems(), std::vector<std::string>{"no faces"});
 }
-
-// ---- the ladder on small meshes ----
 
 TEST(MeshRepair, GoodMeshPassesUntouched) {
   Mesh mesh = cube();
@@ -237,22 +233,6 @@ TEST(MeshRepair, CancellingStopsIt) {
   EXPECT_THROW(repairMesh(cube(), {}, Impatient()), Cancelled);
 }
 
-// ---- where the volume is defined ----
-
-TEST(VolumeIsDefined, NotForOpenIntersectingOrNestedSolids) {
-  EXPECT_TRUE(volumeIsDefined(cube()));
-  EXPECT_FALSE(volumeIsDefined(withoutFace(cube(), 0)));
-  Mesh overlapping = cube();
-  addCube(overlapping, {0.5, 0.5, 0.5}, 1);
-  EXPECT_FALSE(volumeIsDefined(overlapping));
-  Mesh nested = cube();
-  addCube(nested, {0.25, 0.25, 0.25}, 0.5);
-  EXPECT_FALSE(volumeIsDefined(nested));
-  Mesh hollow = cube();
-  addCube(hollow, {0.25, 0.25, 0.25}, 0.5, true);
-  EXPECT_TRUE(volumeIsDefined(hollow));
-}
-
 TEST(SolidVolume, CountsOverlapsOnceAndLeavesCavitiesOut) {
   EXPECT_NEAR(solidVolume(cube()), 1, 2e-3);
   Mesh overlapping = cube();
@@ -273,8 +253,6 @@ TEST(SolidVolume, EqualsTheSumForRealMeshesWithoutIntersections) {
     EXPECT_NEAR(solidVolume(readMesh(sharedData(known.name))) / known.volume, 1, 2e-3) << known.name;
   }
 }
-
-// ---- real files ----
 
 class SelfIntersections : public ::testing::TestWithParam<KnownMesh> {};
 
