@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/large_buffer.h"
+#include "modeling/error.h"
 #include "modeling/parallel.h"
 
 namespace nephele {
@@ -60,13 +62,18 @@ void fillBorder(BrickGrid& grid, const PlacedBrick& placed) {
 float BrickGrid::at(const Vec3i& voxel) const {
   const Vec3i b = brickOf(voxel);
   if (!covers(b)) return background;
-  return brick(
-      table[tableIndex(b)])[sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z))];
+  const auto pool = std::size_t(table[tableIndex(b)]);
+  const std::size_t sample =
+      pool * kVolume +
+      std::size_t(sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)));
+  if (!isPacked()) return values[sample];
+  const BrickCode code = brickCode(ranges[pool]);
+  return code.low + code.unit * float(codes[sample]);
 }
 
 std::size_t BrickGrid::memoryBytes() const {
   return sizeof(BrickGrid) + table.capacity() * sizeof(std::int32_t) + values.capacity() * sizeof(float) +
-         ranges.capacity() * sizeof(Interval);
+         codes.capacity() * sizeof(std::uint16_t) + ranges.capacity() * sizeof(Interval);
 }
 
 Box BrickGrid::worldBox() const {
@@ -79,6 +86,32 @@ Box BrickGrid::worldBox() const {
     box = box.including(indexToWorld(Vec3f(b * kBrick)));
   }
   return box;
+}
+
+void pack(BrickGrid& grid) {
+  if (grid.isPacked()) return;
+  for (const Interval& range : grid.ranges)
+    require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
+  // So many that a batch of floats is worth returning to the system.
+  constexpr std::size_t kBatch = 2048;
+  const std::size_t bricks = grid.poolSize();
+  detail::reserveLarge(grid.codes, bricks * kVolume);
+  for (std::size_t first = 0; first < bricks; first += kBatch) {
+    const std::size_t last = std::min(first + kBatch, bricks);
+    grid.codes.resize(last * kVolume);
+    parallelFor(last - first, kBricksPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = first + begin; b < first + end; ++b) {
+        const float low = grid.ranges[b].min, width = grid.ranges[b].max - low;
+        const float scale = width > 0 ? BrickCode::kLargest / width : 0.0f;
+        const float* values = grid.values.data() + b * kVolume;
+        std::uint16_t* codes = grid.codes.data() + b * kVolume;
+        for (int i = 0; i < kVolume; ++i)
+          codes[i] = std::uint16_t(std::min((values[i] - low) * scale + 0.5f, BrickCode::kLargest));
+      }
+    });
+    detail::releasePages(grid.values.data() + first * kVolume, grid.values.data() + last * kVolume);
+  }
+  std::vector<float>().swap(grid.values);
 }
 
 std::vector<PlacedBrick> placedBricks(const BrickGrid& grid) {

@@ -1,4 +1,4 @@
-// Works slab by slab, each an octree from blocks of 64^3 voxels down to leaves of 8^3. A sampled estimate of
+// Works slab by slab, each an octree from blocks of 32^3 voxels down to leaves of 8^3. A sampled estimate of
 // the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's error
 // is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum. Leaves
 // go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would hold
@@ -20,6 +20,7 @@
 
 #include "levelset/detail_vdb.h"
 #include "levelset/grid_field.h"
+#include "levelset/large_buffer.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
 
@@ -30,7 +31,7 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr int kLeaf = int(Leaf::DIM);
-constexpr int kBlock = 64;
+constexpr int kBlock = 32;
 constexpr int kLevelSetHalfWidth = 3;
 
 /// What a value of l becomes in the file.
@@ -198,6 +199,7 @@ template <class Rule>
 VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const VdbGridLabel& label,
                   const Progress& progress) {
   detail::initializeOpenVdb();
+  detail::releaseFreed();
   auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule).build(progress));
   grid->setName(label.name);
   grid->setGridClass(label.gridClass == VdbGridInfo::Class::levelSet ? openvdb::GRID_LEVEL_SET

@@ -15,9 +15,11 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "levelset/grid_field.h"
+#include "levelset/large_buffer.h"
 #include "levelset/medial_smoothing.h"
 #include "levelset/renormalise.h"
 #include "modeling/error.h"
@@ -46,6 +48,8 @@ constexpr float kEstimateErrorVoxels = 1.0f;
 constexpr float kFoundVoxels = 0.1f;
 /// Bricks whose surface points are searched for once more, to count those that were not found.
 constexpr std::size_t kSearchedBricks = 128;
+/// Thickness of the parts that a layer is baked in.
+constexpr int kPartBricks = 8;
 constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
 
 float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize) {
@@ -96,6 +100,51 @@ class GrownNode final : public FieldNode<float> {
   NodePtr<float> before_, level_, displacement_;
 };
 
+/// Bricks begin <= z < end.
+struct Slab {
+  int begin, end;
+};
+
+/// Puts chosen bricks of packed grids of one voxel size together.
+class Joined {
+ public:
+  explicit Joined(const Box& box, float voxelSize) {
+    grid_ = std::make_shared<BrickGrid>();
+    grid_->voxelSize = voxelSize;
+    grid_->indexToWorld.linear = Mat3f::scaling(voxelSize);
+    grid_->worldToIndex.linear = Mat3f::scaling(1.0f / voxelSize);
+    for (int axis = 0; axis < 3; ++axis) {
+      grid_->firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+      grid_->brickCount[axis] =
+          int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - grid_->firstBrick[axis];
+    }
+    const Vec3i n = grid_->brickCount;
+    grid_->table.resize(std::size_t(n.x) * n.y * n.z);
+    grid_->codes.resize(kVolume);
+    grid_->ranges.push_back(Interval::of(0));
+  }
+
+  void add(const BrickGrid& part, const std::vector<bool>& chosen) {
+    const auto count = std::size_t(std::count(chosen.begin(), chosen.end(), true));
+    detail::resizeLarge(grid_->codes, (grid_->poolSize() + count) * kVolume);
+    for (const PlacedBrick& brick : placedBricks(part)) {
+      const auto pool = std::size_t(brick.pool);
+      if (!chosen[pool]) continue;
+      grid_->table[grid_->tableIndex(brick.brick)] = std::int32_t(grid_->poolSize());
+      std::copy_n(part.codes.data() + pool * kVolume, kVolume,
+                  grid_->codes.data() + grid_->poolSize() * kVolume);
+      grid_->ranges.push_back(part.ranges[pool]);
+    }
+  }
+
+  std::shared_ptr<BrickGrid> grid() const { return grid_; }
+
+ private:
+  static constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
+
+  std::shared_ptr<BrickGrid> grid_;
+};
+
 class LayerSampler {
  public:
   LayerSampler(const std::vector<CumuloLayer>& layers, const CumuloGridOptions& options,
@@ -106,17 +155,7 @@ class LayerSampler {
     const auto start = std::chrono::steady_clock::now();
     progress_.begin("layer " + std::to_string(step.index + 1));
     const float voxel = cumuloVoxelSize(layers_, step.index, options_.voxelSize);
-    const auto grid = bakeGrid(step.displacement,
-                               {.voxelSize = voxel,
-                                .box = options_.box.expanded(reach_ + step.margin),
-                                .interpolation = Interpolation::tricubic},
-                               progress_);
-    if (step.bound > 0)
-      smoothMedialJumps(
-          *grid,
-          {.jump = kLargestSlope * step.bound * step.layer->frequency * voxel, .dilation = dilation(voxel)},
-          progress_);
-    report(step, *grid);
+    const std::shared_ptr<BrickGrid> grid = bakeLayer(step, voxel);
 
     const ScalarField displacement = gridField(grid, Interpolation::tricubic);
     CumuloSampled sampled{displacement, step.before + abs(displacement), 0.0f, 0.0f};
@@ -131,6 +170,37 @@ class LayerSampler {
   float estimateVoxelSize = 0;
 
  private:
+  /// The layer's grid, packed. Made in parts along z, since samples take twice the memory until they are
+  /// packed. A part sees as much of its neighbours as can reach it through the smoothing: the parts do not
+  /// show.
+  std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
+    const Box box = options_.box.expanded(reach_ + step.margin);
+    const MedialSmoothingOptions smoothing{.jump = kLargestSlope * step.bound * step.layer->frequency * voxel,
+                                           .dilation = dilation(voxel)};
+    const float thickness = float(kPartBricks * BrickGrid::kBrick) * voxel;
+    const float halo = float(smoothing.dilation + smoothing.steps + 1 + BrickGrid::kAfter) * voxel;
+    const int first = int(std::floor(box.min.z / thickness)), last = int(std::floor(box.max.z / thickness));
+    Joined joined(box, voxel);
+    Count count;
+    for (int part = first; part <= last; ++part) {
+      const Box around{{box.min.x, box.min.y, float(part) * thickness - halo},
+                       {box.max.x, box.max.y, float(part + 1) * thickness + halo}};
+      detail::releaseFreed();
+      const auto baked = bakeGrid(
+          step.displacement,
+          {.voxelSize = voxel, .box = box.intersection(around), .interpolation = Interpolation::tricubic},
+          progress_);
+      if (step.bound > 0) smoothMedialJumps(*baked, smoothing, progress_);
+      const Slab slab{part == first ? std::numeric_limits<int>::min() : part * kPartBricks,
+                      part == last ? std::numeric_limits<int>::max() : (part + 1) * kPartBricks};
+      const std::vector<bool> matters = judged(step, *baked, slab, count);
+      pack(*baked);
+      joined.add(*baked, matters);
+    }
+    report(step, count, voxel);
+    return joined.grid();
+  }
+
   int dilation(float voxel) const {
     if (options_.medialSmoothing == 0) return 0;
     const float voxels = float(options_.medialSmoothing) * options_.voxelSize / voxel;
@@ -141,7 +211,7 @@ class LayerSampler {
   void prepareNext(const CumuloStep& step, const std::shared_ptr<BrickGrid>& grid, CumuloSampled& sampled) {
     const float voxel = grid->voxelSize;
     if (step.index + 1 == layers_.size()) {
-      estimate = ScalarField(std::make_shared<GrownNode>(step.surface, step.level, gridField(grid)));
+      estimate = (level_ ? withRangesOf(*level_, step.before) : step.before) + abs(gridField(grid));
       estimateVoxelSize = voxel;
       return;
     }
@@ -161,10 +231,11 @@ class LayerSampler {
       return;
     }
     // At the grid's own voxels trilinear interpolation gives the samples.
-    const auto level = bakeGrid(
-        ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))), spec, progress_);
-    sampled.level = gridField(level);
-    sampled.surface = gridField(level, Interpolation::tricubic);
+    level_ = bakeGrid(ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))),
+                      spec, progress_);
+    pack(*level_);
+    sampled.level = gridField(level_);
+    sampled.surface = gridField(level_, Interpolation::tricubic);
   }
 
   /// The samples of one brick at which the layer was evaluated.
@@ -190,54 +261,67 @@ class LayerSampler {
     }
   };
 
-  /// What a brick adds to the report. Kept per brick and added up in order, so that threads do not show.
+  /// What bricks add to the report. Kept per brick and added up in order, so that threads do not show.
   struct Count {
     double displacement = 0;
-    std::uint32_t active = 0, near = 0, searched = 0, missed = 0;
+    std::uint64_t active = 0, near = 0, searched = 0, missed = 0;
+
+    Count& operator+=(const Count& other) {
+      displacement += other.displacement;
+      active += other.active;
+      near += other.near;
+      searched += other.searched;
+      missed += other.missed;
+      return *this;
+    }
   };
 
-  void report(const CumuloStep& step, const BrickGrid& grid) {
-    const std::vector<PlacedBrick> bricks = placedBricks(grid);
+  /// Adds what the part of a layer inside `slab` comes to, and says of every brick of the pool whether it
+  /// matters: whether its sums are such that the layers after this one can bring them to the surface.
+  std::vector<bool> judged(const CumuloStep& step, const BrickGrid& grid, const Slab& slab,
+                           Count& total) const {
+    std::vector<PlacedBrick> bricks = placedBricks(grid);
+    std::erase_if(bricks,
+                  [&](const PlacedBrick& b) { return b.brick.z < slab.begin || b.brick.z >= slab.end; });
     const std::size_t stride = std::max<std::size_t>(1, bricks.size() / kSearchedBricks);
     const VectorField foot =
         surfacePoint(step.surface, {.steps = options_.newtonSteps, .voxel = options_.voxelSize});
+    const float least = step.bound - step.reach - step.margin;
     std::vector<Count> counts(bricks.size());
+    std::vector<std::uint8_t> matters(bricks.size());
     parallelFor(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
+      std::array<float, kBrickSamples> level;
       for (std::size_t b = begin; b < end; ++b) {
         const Samples samples(grid, bricks[b]);
-        counts[b].active = static_cast<std::uint32_t>(samples.count);
+        counts[b].active = samples.count;
         if (samples.count == 0) continue;
-        countNear(step, grid.voxelSize, samples, counts[b]);
+        step.level.eval(samples.points(), std::span(level).first(samples.count));
+        for (std::size_t i = 0; i < samples.count; ++i) {
+          matters[b] |= level[i] + samples.displacement[i] >= least;
+          if (!(std::abs(level[i]) <= grid.voxelSize)) continue;
+          counts[b].displacement += samples.displacement[i];
+          ++counts[b].near;
+        }
         if (b % stride == 0) countMissed(step, foot, samples, counts[b]);
       }
     });
-
-    Count all;
-    CumuloLayerReport r;
-    for (const Count& c : counts) {
-      r.activeVoxels += c.active;
-      all.displacement += c.displacement;
-      all.near += c.near;
-      all.searched += c.searched;
-      all.missed += c.missed;
+    std::vector<bool> result(grid.poolSize());
+    for (std::size_t b = 0; b < bricks.size(); ++b) {
+      total += counts[b];
+      result[std::size_t(bricks[b].pool)] = matters[b] != 0;
     }
-    r.amplitude = step.layer->amplitude.range(Box::everywhere()).max;
-    r.frequency = step.layer->frequency;
-    r.voxelSize = grid.voxelSize;
-    r.unconvergedFraction = all.searched > 0 ? double(all.missed) / all.searched : 0.0;
-    r.meanDisplacement = all.near > 0 ? all.displacement / all.near : 0.0;
-    reports.push_back(r);
+    return result;
   }
 
-  /// The displacement on the surface that the layer grows on.
-  static void countNear(const CumuloStep& step, float voxel, const Samples& samples, Count& count) {
-    std::array<float, kBrickSamples> level;
-    step.level.eval(samples.points(), std::span(level).first(samples.count));
-    for (std::size_t i = 0; i < samples.count; ++i) {
-      if (!(std::abs(level[i]) <= voxel)) continue;
-      count.displacement += samples.displacement[i];
-      ++count.near;
-    }
+  void report(const CumuloStep& step, const Count& all, float voxel) {
+    CumuloLayerReport r;
+    r.amplitude = step.layer->amplitude.range(Box::everywhere()).max;
+    r.frequency = step.layer->frequency;
+    r.voxelSize = voxel;
+    r.activeVoxels = all.active;
+    r.unconvergedFraction = all.searched > 0 ? double(all.missed) / double(all.searched) : 0.0;
+    r.meanDisplacement = all.near > 0 ? all.displacement / double(all.near) : 0.0;
+    reports.push_back(r);
   }
 
   /// The points whose surface point is not on the surface.
@@ -249,7 +333,7 @@ class LayerSampler {
               Spans<3>{{std::span(x).first(n), std::span(y).first(n), std::span(z).first(n)}});
     step.surface.eval({std::span(x).first(n), std::span(y).first(n), std::span(z).first(n)},
                       std::span(residual).first(n));
-    count.searched = static_cast<std::uint32_t>(n);
+    count.searched = n;
     for (std::size_t i = 0; i < n; ++i)
       count.missed += !(std::abs(residual[i]) <= kFoundVoxels * options_.voxelSize);
   }
@@ -258,6 +342,8 @@ class LayerSampler {
   const CumuloGridOptions& options_;
   const Progress& progress_;
   float reach_;
+  /// The sampled l_i that the next layer reads, if there is one.
+  std::shared_ptr<BrickGrid> level_;
 };
 
 }  // namespace

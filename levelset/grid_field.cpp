@@ -23,17 +23,20 @@ constexpr float kTricubicRounding = 1e-5f;
 /// Rounding of index coordinates, relative to the largest term of the map.
 constexpr double kIndexRounding = 1e-6;
 
-void requireFit(const BrickGrid* grid) {
+void requireTable(const BrickGrid* grid) {
   require(grid != nullptr, "gridField: the grid must not be null");
   const Vec3i n = grid->brickCount;
   require(n.x >= 0 && n.y >= 0 && n.z >= 0 && grid->table.size() == std::size_t(n.x) * n.y * n.z,
           "gridField: the table must have one entry per brick position");
-  require(grid->values.size() == grid->poolSize() * BrickGrid::kVolume,
-          "gridField: values and ranges must belong to the same number of bricks");
   for (const std::int32_t pool : grid->table)
     require(pool >= 0 && std::size_t(pool) < grid->poolSize(),
             "gridField: the table names a brick that is not there");
   require(grid->voxelSize > 0 && std::isfinite(grid->voxelSize), "gridField: voxelSize must be > 0");
+}
+
+void requireSamples(const BrickGrid& grid) {
+  require((grid.isPacked() ? grid.codes.size() : grid.values.size()) == grid.poolSize() * BrickGrid::kVolume,
+          "gridField: values and ranges must belong to the same number of bricks");
 }
 
 /// What values interpolated between samples of range `r` can be.
@@ -54,7 +57,7 @@ Interval interpolated(const Interval& r, Interpolation interpolation) {
 class Sampler {
  public:
   Sampler(std::shared_ptr<const BrickGrid> grid, Interpolation interpolation)
-      : grid_((requireFit(grid.get()), std::move(grid))), ranges_(*grid_), interpolation_(interpolation) {}
+      : grid_((requireTable(grid.get()), std::move(grid))), ranges_(*grid_), interpolation_(interpolation) {}
 
   const std::shared_ptr<const BrickGrid>& grid() const { return grid_; }
 
@@ -129,6 +132,30 @@ class GridNode final : public FieldNode<float> {
   Sampler sampler_;
 };
 
+class RangedNode final : public FieldNode<float> {
+ public:
+  RangedNode(std::shared_ptr<const Sampler> ranges, NodePtr<float> field)
+      : ranges_(std::move(ranges)), field_(std::move(field)) {}
+
+  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
+    field_->eval(points, values, scratch);
+  }
+  void evalGrad(const PointBlock& points, const BlockLanes<1>& values, const BlockLanes<3>& grads,
+                Scratch& scratch) const override {
+    field_->evalGrad(points, values, grads, scratch);
+  }
+  Interval range(const Box& box) const override { return ranges_->range(box); }
+  NodePtr<float> restricted(Restriction& restriction) const override {
+    const NodePtr<float> field = restrictNode(field_, restriction);
+    return field == field_ ? nullptr : std::make_shared<RangedNode>(ranges_, field);
+  }
+  float differenceStep() const override { return field_->differenceStep(); }
+
+ private:
+  std::shared_ptr<const Sampler> ranges_;
+  NodePtr<float> field_;
+};
+
 class VectorGridNode final : public FieldNode<Vec3f> {
  public:
   VectorGridNode(VectorGrids grids, Interpolation interpolation)
@@ -163,11 +190,28 @@ class VectorGridNode final : public FieldNode<Vec3f> {
 }  // namespace
 
 ScalarField gridField(std::shared_ptr<const BrickGrid> grid, Interpolation interpolation) {
+  if (grid) requireSamples(*grid);
   return ScalarField(std::make_shared<GridNode>(std::move(grid), interpolation));
 }
 
 VectorField gridField(VectorGrids grids, Interpolation interpolation) {
+  for (const auto& grid : grids)
+    if (grid) requireSamples(*grid);
   return VectorField(std::make_shared<VectorGridNode>(std::move(grids), interpolation));
+}
+
+ScalarField withRangesOf(const BrickGrid& grid, const ScalarField& field) {
+  auto layout = std::make_shared<BrickGrid>();
+  layout->indexToWorld = grid.indexToWorld;
+  layout->worldToIndex = grid.worldToIndex;
+  layout->voxelSize = grid.voxelSize;
+  layout->background = grid.background;
+  layout->firstBrick = grid.firstBrick;
+  layout->brickCount = grid.brickCount;
+  layout->table = grid.table;
+  layout->ranges = grid.ranges;
+  return ScalarField(std::make_shared<RangedNode>(
+      std::make_shared<Sampler>(std::move(layout), Interpolation::trilinear), field.node()));
 }
 
 std::shared_ptr<const BrickGrid> gridOf(const ScalarField& field) {

@@ -22,6 +22,11 @@ enum class Interpolation { trilinear, tricubic };
 ScalarField gridField(std::shared_ptr<const BrickGrid> grid,
                       Interpolation interpolation = Interpolation::trilinear);
 
+/// `field`, with ranges taken from the bricks of `grid` instead of its own: for a field whose values the grid
+/// holds, near enough for what the ranges are used for. Keeps a copy of the grid's table and ranges, not of
+/// its samples.
+ScalarField withRangesOf(const BrickGrid& grid, const ScalarField& field);
+
 using VectorGrids = std::array<std::shared_ptr<const BrickGrid>, 3>;
 
 /// The same for vectors: one grid per component.

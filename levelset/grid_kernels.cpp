@@ -6,6 +6,9 @@
 // into vectors by 4x4 transpositions inside 128-bit blocks. That takes a fraction of the time of a gather
 // instruction per sample, and the addresses are 64-bit, so that the pool may be of any size.
 //
+// A packed grid's codes are interpolated as they are, and the result taken back to values: that is the same,
+// since interpolation is linear and its weights sum to 1.
+//
 // All arithmetic is written as differences and one product and sum per weight, never fused: constants come
 // out exactly, and the vector code gives the bits of the plain loops on every instruction set. Limit: index
 // coordinates are floats; positions inside a voxel fade beyond some 10^5 voxels from the origin.
@@ -14,6 +17,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "levelset/grid_kernels.cpp"
@@ -45,6 +49,17 @@ struct GridMap {
   bool diagonal;
   const std::int32_t* table;
   const float* values;
+  const std::uint16_t* codes;
+  const Interval* ranges;
+
+  /// Samples as floats, or the codes of a packed grid.
+  template <class Sample>
+  const Sample* samples() const {
+    if constexpr (std::is_same_v<Sample, float>)
+      return values;
+    else
+      return codes;
+  }
 };
 
 float notBelow(double v) {
@@ -64,7 +79,9 @@ GridMap mapOf(const BrickGrid& grid) {
               grid.brickCount.y,
               true,
               grid.table.data(),
-              grid.values.data()};
+              grid.values.data(),
+              grid.codes.data(),
+              grid.ranges.data()};
   for (int axis = 0; axis < 3; ++axis) {
     map.first[axis] = grid.firstBrick[axis];
     map.low[axis] = notBelow(8.0 * grid.firstBrick[axis]);
@@ -76,12 +93,27 @@ GridMap mapOf(const BrickGrid& grid) {
 }
 
 /// The cell of a point: its fractions and the stored sample one before its corner in x, y and z.
+template <class Sample>
 struct Cell {
   float fx, fy, fz;
-  const float* corner;
+  const Sample* corner;
+  BrickCode code;
+
+  Cell(const GridMap& map, const float (&f)[3], std::size_t pool, int offset)
+      : fx(f[0]),
+        fy(f[1]),
+        fz(f[2]),
+        corner(map.samples<Sample>() + pool * BrickGrid::kVolume + offset),
+        code(brickCode(map.ranges[pool])) {}
+
+  float decoded(float value) const {
+    return std::is_same_v<Sample, float> ? value : code.low + code.unit * value;
+  }
+  float decodedSlope(float slope) const { return std::is_same_v<Sample, float> ? slope : code.unit * slope; }
 };
 
-Cell locate(const GridMap& map, float x, float y, float z) {
+template <class Sample>
+Cell<Sample> locate(const GridMap& map, float x, float y, float z) {
   const auto& m = map.linear;
   const auto& t = map.translation;
   float q[3];
@@ -91,7 +123,7 @@ Cell locate(const GridMap& map, float x, float y, float z) {
     for (int a = 0; a < 3; ++a) q[a] = m[3 * a] * x + m[3 * a + 1] * y + m[3 * a + 2] * z + t[a];
   }
   for (int a = 0; a < 3; ++a)
-    if (!(q[a] >= map.low[a] && q[a] < map.high[a])) return {0, 0, 0, map.values};
+    if (!(q[a] >= map.low[a] && q[a] < map.high[a])) return {map, {0, 0, 0}, 0, 0};
   int brick[3], local[3];
   float f[3];
   for (int a = 0; a < 3; ++a) {
@@ -102,8 +134,7 @@ Cell locate(const GridMap& map, float x, float y, float z) {
   }
   const std::size_t pool =
       std::size_t(map.table[(std::size_t(brick[2]) * map.countY + brick[1]) * map.countX + brick[0]]);
-  return {f[0], f[1], f[2],
-          map.values + pool * BrickGrid::kVolume + (local[2] * kRow + local[1]) * kRow + local[0]};
+  return {map, f, pool, (local[2] * kRow + local[1]) * kRow + local[0]};
 }
 
 float lerp(float a, float b, float f) {
@@ -146,81 +177,76 @@ bool fillIfEmpty(const BrickGrid& grid, const PointBlock& points, float* values,
   return true;
 }
 
-}  // namespace
-
-void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (fillIfEmpty(grid, points, values, nullptr)) return;
-  const GridMap map = mapOf(grid);
+template <class Sample>
+void trilinearLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
     float plane[2];
     for (int k = 0; k < 2; ++k) {
-      const float* a = cell.corner + rowOffset(1, k + 1);
-      const float* b = cell.corner + rowOffset(2, k + 1);
+      const Sample* a = cell.corner + rowOffset(1, k + 1);
+      const Sample* b = cell.corner + rowOffset(2, k + 1);
       plane[k] = lerp(lerp(a[1], a[2], cell.fx), lerp(b[1], b[2], cell.fx), cell.fy);
     }
-    values[i] = lerp(plane[0], plane[1], cell.fz);
+    values[i] = cell.decoded(lerp(plane[0], plane[1], cell.fz));
   }
 }
 
-void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
-                               const BlockLanes<3>& grads) {
-  if (fillIfEmpty(grid, points, values, &grads)) return;
-  const GridMap map = mapOf(grid);
+template <class Sample>
+void trilinearGradLoop(const GridMap& map, const PointBlock& points, float* values,
+                       const BlockLanes<3>& grads) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
     const float fx = cell.fx, fy = cell.fy, fz = cell.fz;
     // r[k][j] and dx[k][j]: the rows at z - 1 + k, y - 1 + j, interpolated in x, and their difference along
     // x.
     float r[4][4] = {}, dx[4][4] = {};
     for (int k = 0; k < 4; ++k)
       for (int j = 0; j < 4; ++j) {
-        const float* row = cell.corner + rowOffset(j, k);
+        const Sample* row = cell.corner + rowOffset(j, k);
         r[k][j] = lerp(row[1], row[2], fx);
-        dx[k][j] = lerp(row[2] - row[0], row[3] - row[1], fx);
+        dx[k][j] = lerp(float(row[2]) - float(row[0]), float(row[3]) - float(row[1]), fx);
       }
     const auto alongY = [&](int k) { return lerp(r[k][2] - r[k][0], r[k][3] - r[k][1], fy); };
     const auto alongZ = [&](int j) { return lerp(r[2][j] - r[0][j], r[3][j] - r[1][j], fz); };
-    values[i] = lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz);
+    values[i] = cell.decoded(lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz));
+    const float half = cell.decodedSlope(0.5f);
     storeGradient(map,
-                  {0.5f * lerp(lerp(dx[1][1], dx[1][2], fy), lerp(dx[2][1], dx[2][2], fy), fz),
-                   0.5f * lerp(alongY(1), alongY(2), fz), 0.5f * lerp(alongZ(1), alongZ(2), fy)},
+                  {half * lerp(lerp(dx[1][1], dx[1][2], fy), lerp(dx[2][1], dx[2][2], fy), fz),
+                   half * lerp(alongY(1), alongY(2), fz), half * lerp(alongZ(1), alongZ(2), fy)},
                   grads, i);
   }
 }
 
-void sampleTricubicScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (fillIfEmpty(grid, points, values, nullptr)) return;
-  const GridMap map = mapOf(grid);
+template <class Sample>
+void tricubicLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
     const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
     float plane[4];
     for (int k = 0; k < 4; ++k) {
       float row[4];
       for (int j = 0; j < 4; ++j) {
-        const float* s = cell.corner + rowOffset(j, k);
+        const Sample* s = cell.corner + rowOffset(j, k);
         row[j] = wx(s[0], s[1], s[2], s[3]);
       }
       plane[k] = wy(row[0], row[1], row[2], row[3]);
     }
-    values[i] = wz(plane[0], plane[1], plane[2], plane[3]);
+    values[i] = cell.decoded(wz(plane[0], plane[1], plane[2], plane[3]));
   }
 }
 
-void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
-                              const BlockLanes<3>& grads) {
-  if (fillIfEmpty(grid, points, values, &grads)) return;
-  const GridMap map = mapOf(grid);
+template <class Sample>
+void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* values,
+                      const BlockLanes<3>& grads) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell cell = locate(map, points.x[i], points.y[i], points.z[i]);
+    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
     const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
     const CubicWeights sx = cubicSlopes(cell.fx), sy = cubicSlopes(cell.fy), sz = cubicSlopes(cell.fz);
     float v[4], dx[4], dy[4];
     for (int k = 0; k < 4; ++k) {
       float row[4], slope[4];
       for (int j = 0; j < 4; ++j) {
-        const float* s = cell.corner + rowOffset(j, k);
+        const Sample* s = cell.corner + rowOffset(j, k);
         row[j] = wx(s[0], s[1], s[2], s[3]);
         slope[j] = sx.offset(s[0], s[1], s[2], s[3]);
       }
@@ -228,12 +254,39 @@ void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, f
       dx[k] = wy(slope[0], slope[1], slope[2], slope[3]);
       dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
     }
-    values[i] = wz(v[0], v[1], v[2], v[3]);
+    values[i] = cell.decoded(wz(v[0], v[1], v[2], v[3]));
     storeGradient(
         map,
-        {wz(dx[0], dx[1], dx[2], dx[3]), wz(dy[0], dy[1], dy[2], dy[3]), sz.offset(v[0], v[1], v[2], v[3])},
+        {cell.decodedSlope(wz(dx[0], dx[1], dx[2], dx[3])), cell.decodedSlope(wz(dy[0], dy[1], dy[2], dy[3])),
+         cell.decodedSlope(sz.offset(v[0], v[1], v[2], v[3]))},
         grads, i);
   }
+}
+
+}  // namespace
+
+void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (fillIfEmpty(grid, points, values, nullptr)) return;
+  (grid.isPacked() ? trilinearLoop<std::uint16_t> : trilinearLoop<float>)(mapOf(grid), points, values);
+}
+
+void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
+                               const BlockLanes<3>& grads) {
+  if (fillIfEmpty(grid, points, values, &grads)) return;
+  (grid.isPacked() ? trilinearGradLoop<std::uint16_t> : trilinearGradLoop<float>)(mapOf(grid), points, values,
+                                                                                  grads);
+}
+
+void sampleTricubicScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (fillIfEmpty(grid, points, values, nullptr)) return;
+  (grid.isPacked() ? tricubicLoop<std::uint16_t> : tricubicLoop<float>)(mapOf(grid), points, values);
+}
+
+void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
+                              const BlockLanes<3>& grads) {
+  if (fillIfEmpty(grid, points, values, &grads)) return;
+  (grid.isPacked() ? tricubicGradLoop<std::uint16_t> : tricubicGradLoop<float>)(mapOf(grid), points, values,
+                                                                                grads);
 }
 
 }  // namespace nephele
@@ -271,12 +324,28 @@ using DI = hn::RebindToSigned<D>;
 using VI = hn::Vec<DI>;
 constexpr int kLanes = int(hn::MaxLanes(D()));
 
+template <class Sample>
 struct Cells {
   V fx, fy, fz;
-  const float* corner[kLanes];
+  const Sample* corner[kLanes];
+  V low, unit;
+
+  HWY_INLINE V decoded(V value) const {
+    if constexpr (std::is_same_v<Sample, float>)
+      return value;
+    else
+      return low + unit * value;
+  }
+  HWY_INLINE V decodedSlope(V slope) const {
+    if constexpr (std::is_same_v<Sample, float>)
+      return slope;
+    else
+      return unit * slope;
+  }
 };
 
-HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cells& cells) {
+template <class Sample>
+HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cells<Sample>& cells) {
   const D d;
   const DI di;
   const V x = hn::LoadU(d, points.x + i), y = hn::LoadU(d, points.y + i), z = hn::LoadU(d, points.z + i);
@@ -312,17 +381,36 @@ HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cell
   hn::Store(hn::And(index, keep), di, entry);
   hn::Store(offset, di, start);
   hn::Store(keep, di, mask);
-  for (int l = 0; l < kLanes; ++l)
-    cells.corner[l] = map.values + std::size_t(map.table[entry[l]] & mask[l]) * BrickGrid::kVolume + start[l];
+  HWY_ALIGN float low[kLanes], unit[kLanes];
+  for (int l = 0; l < kLanes; ++l) {
+    const auto pool = std::size_t(map.table[entry[l]] & mask[l]);
+    cells.corner[l] = map.samples<Sample>() + pool * BrickGrid::kVolume + start[l];
+    if constexpr (!std::is_same_v<Sample, float>) {
+      const BrickCode code = brickCode(map.ranges[pool]);
+      low[l] = code.low;
+      unit[l] = code.unit;
+    }
+  }
+  if constexpr (!std::is_same_v<Sample, float>) {
+    cells.low = hn::Load(d, low);
+    cells.unit = hn::Load(d, unit);
+  }
 }
 
 /// Element e of every 128-bit block b: four floats of point 4 b + e.
-template <int kElement>
-HWY_INLINE V loadFours(const Cells& cells, int offset) {
+template <int kElement, class Sample>
+HWY_INLINE V loadFours(const Cells<Sample>& cells, int offset) {
   const D d;
   const hn::Full128<float> d4;
-  const auto four = [&](int block)
-                        HWY_ATTR { return hn::LoadU(d4, cells.corner[4 * block + kElement] + offset); };
+  const auto four = [&](int block) HWY_ATTR {
+    const Sample* samples = cells.corner[4 * block + kElement] + offset;
+    if constexpr (std::is_same_v<Sample, float>) {
+      return hn::LoadU(d4, samples);
+    } else {
+      const hn::Full128<std::int32_t> d4i;
+      return hn::ConvertTo(d4, hn::PromoteTo(d4i, hn::LoadU(hn::Full64<std::uint16_t>(), samples)));
+    }
+  };
 #if HWY_MAX_BYTES >= 64
   const hn::Half<D> half;
   return hn::Combine(d, hn::Combine(half, four(3), four(2)), hn::Combine(half, four(1), four(0)));
@@ -348,7 +436,8 @@ HWY_INLINE V upper64(V a, V b) {
   return hn::BitCast(D(), hn::InterleaveUpper(d64, hn::BitCast(d64, a), hn::BitCast(d64, b)));
 }
 
-HWY_INLINE Row loadRow(const Cells& cells, int offset) {
+template <class Sample>
+HWY_INLINE Row loadRow(const Cells<Sample>& cells, int offset) {
   const D d;
   const V p0 = loadFours<0>(cells, offset), p1 = loadFours<1>(cells, offset);
   const V p2 = loadFours<2>(cells, offset), p3 = loadFours<3>(cells, offset);
@@ -362,7 +451,8 @@ HWY_INLINE V lerp(V a, V b, V f) {
 }
 
 /// One row interpolated in x; the compiler drops what loadRow makes and this does not read.
-HWY_INLINE V rowValue(const Cells& cells, int offset) {
+template <class Sample>
+HWY_INLINE V rowValue(const Cells<Sample>& cells, int offset) {
   const Row row = loadRow(cells, offset);
   return lerp(row.left, row.right, cells.fx);
 }
@@ -378,24 +468,23 @@ HWY_INLINE void storeGradient(const GridMap& map, V gx, V gy, V gz, const BlockL
   }
 }
 
-void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+template <class Sample>
+void trilinearOf(const GridMap& map, const PointBlock& points, float* values) {
   const D d;
-  const GridMap map = mapOf(grid);
-  Cells cells;
+  Cells<Sample> cells;
   for (int i = 0; i < points.count; i += kLanes) {
     locate(map, points, i, cells);
     const V plane0 = lerp(rowValue(cells, rowOffset(1, 1)), rowValue(cells, rowOffset(2, 1)), cells.fy);
     const V plane1 = lerp(rowValue(cells, rowOffset(1, 2)), rowValue(cells, rowOffset(2, 2)), cells.fy);
-    hn::StoreU(lerp(plane0, plane1, cells.fz), d, values + i);
+    hn::StoreU(cells.decoded(lerp(plane0, plane1, cells.fz)), d, values + i);
   }
 }
 
-void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
-                   const BlockLanes<3>& grads) {
+template <class Sample>
+void trilinearGradOf(const GridMap& map, const PointBlock& points, float* values,
+                     const BlockLanes<3>& grads) {
   const D d;
-  const V half = hn::Set(d, 0.5f);
-  const GridMap map = mapOf(grid);
-  Cells cells;
+  Cells<Sample> cells;
   for (int i = 0; i < points.count; i += kLanes) {
     locate(map, points, i, cells);
     const V fx = cells.fx, fy = cells.fy, fz = cells.fz;
@@ -415,7 +504,8 @@ void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* value
       const V before = rowValue(cells, rowOffset(j + 1, 0)), after = rowValue(cells, rowOffset(j + 1, 3));
       dz[j] = lerp(r[1][j] - before, after - r[0][j], fz);
     }
-    hn::StoreU(lerp(v[0], v[1], fz), d, values + i);
+    hn::StoreU(cells.decoded(lerp(v[0], v[1], fz)), d, values + i);
+    const V half = cells.decodedSlope(hn::Set(d, 0.5f));
     storeGradient(map, half * lerp(dx[0], dx[1], fz), half * lerp(dy[0], dy[1], fz),
                   half * lerp(dz[0], dz[1], fy), grads, i);
   }
@@ -445,10 +535,10 @@ HWY_INLINE Weights cubicSlopes(V t) {
           half * (t * (three * t - hn::Set(d, 2.0f)))};
 }
 
-void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+template <class Sample>
+void tricubicOf(const GridMap& map, const PointBlock& points, float* values) {
   const D d;
-  const GridMap map = mapOf(grid);
-  Cells cells;
+  Cells<Sample> cells;
   for (int i = 0; i < points.count; i += kLanes) {
     locate(map, points, i, cells);
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
@@ -461,15 +551,14 @@ void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
       }
       plane[k] = wy(row);
     }
-    hn::StoreU(cubicWeights(cells.fz)(plane), d, values + i);
+    hn::StoreU(cells.decoded(cubicWeights(cells.fz)(plane)), d, values + i);
   }
 }
 
-void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
-                  const BlockLanes<3>& grads) {
+template <class Sample>
+void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
   const D d;
-  const GridMap map = mapOf(grid);
-  Cells cells;
+  Cells<Sample> cells;
   for (int i = 0; i < points.count; i += kLanes) {
     locate(map, points, i, cells);
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
@@ -487,9 +576,27 @@ void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values
       dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
     }
     const Weights wz = cubicWeights(cells.fz), sz = cubicSlopes(cells.fz);
-    hn::StoreU(wz(v), d, values + i);
-    storeGradient(map, wz(dx), wz(dy), sz.offset(v[0], v[1], v[2], v[3]), grads, i);
+    hn::StoreU(cells.decoded(wz(v)), d, values + i);
+    storeGradient(map, cells.decodedSlope(wz(dx)), cells.decodedSlope(wz(dy)),
+                  cells.decodedSlope(sz.offset(v[0], v[1], v[2], v[3])), grads, i);
   }
+}
+
+void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+  (grid.isPacked() ? trilinearOf<std::uint16_t> : trilinearOf<float>)(mapOf(grid), points, values);
+}
+void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                   const BlockLanes<3>& grads) {
+  (grid.isPacked() ? trilinearGradOf<std::uint16_t> : trilinearGradOf<float>)(mapOf(grid), points, values,
+                                                                              grads);
+}
+void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+  (grid.isPacked() ? tricubicOf<std::uint16_t> : tricubicOf<float>)(mapOf(grid), points, values);
+}
+void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+                  const BlockLanes<3>& grads) {
+  (grid.isPacked() ? tricubicGradOf<std::uint16_t> : tricubicGradOf<float>)(mapOf(grid), points, values,
+                                                                            grads);
 }
 
 #endif

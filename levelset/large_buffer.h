@@ -1,5 +1,6 @@
 #pragma once
 
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <cstdint>
@@ -24,6 +25,21 @@ template <class T>
 void resizeLarge(std::vector<T>& values, std::size_t count) {
   reserveLarge(values, count);
   values.resize(count);
+}
+
+/// Gives the whole pages of values that are no longer needed back to the system; they read as 0 from then on.
+template <class T>
+void releasePages(T* first, T* last) {
+  constexpr std::uintptr_t kPage = 4096;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(first) + kPage - 1) & ~(kPage - 1);
+  const auto end = reinterpret_cast<std::uintptr_t>(last) & ~(kPage - 1);
+  if (begin < end) static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED));
+}
+
+/// Gives back what the allocator keeps of memory that was freed: after a stage with many small parts, before
+/// one with few large ones.
+inline void releaseFreed() {
+  malloc_trim(0);
 }
 
 }  // namespace nephele::detail

@@ -383,6 +383,7 @@ class Mesher {
 }  // namespace
 
 Mesh marchingCubes(const BrickGrid& grid, float isovalue, const Progress& progress) {
+  require(!grid.isPacked(), "marchingCubes: the grid must not be packed");
   require(std::isfinite(isovalue), "marchingCubes: isovalue must be finite, got " + std::to_string(isovalue));
   const Vec3i& count = grid.brickCount;
   require(count.x >= 0 && count.y >= 0 && count.z >= 0 &&

@@ -49,7 +49,7 @@ double reachOf(int index) {
 }
 
 struct Level {
-  std::shared_ptr<const BrickGrid> grid;
+  std::shared_ptr<BrickGrid> grid;
   /// World distance where the next level starts, and over which it takes over.
   float nextStart = 0.0f, nextBlend = 1.0f;
   /// The next level holds more of this side; else the side's band ends within this level.
@@ -361,6 +361,7 @@ ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options, c
     levels->all.push_back(level);
     if (!level.continuesOutside && !level.continuesInside) break;
   }
+  for (const Level& level : levels->all) pack(*level.grid);
   const std::size_t last = levels->all.size() - 1;
   return ScalarField(std::make_shared<MeshDistanceNode>(std::move(levels), 0, last));
 }

@@ -27,6 +27,9 @@ namespace nephele {
 
 namespace {
 
+/// A layer's band needs less beyond its reach than inside, where the next sums still rise: 3 voxels to 4.
+constexpr float kOuterShare = 0.75f;
+
 /// What the valleys of a layer are cleared by: the displacement of the layer before, and its amplitude.
 struct Before {
   NodePtr<float> displacement;
@@ -43,7 +46,7 @@ class LayerNode final : public FieldNode<float> {
         billow_(step.layer->billow.node()),
         before_(before),
         billowScale_(step.layer->billowScale),
-        band_{-step.reach - step.margin, step.margin},
+        band_{-step.reach - kOuterShare * step.margin, step.margin},
         bound_(step.bound) {
     projection_.steps = options.newtonSteps;
     projection_.voxel = options.voxelSize;

@@ -70,7 +70,7 @@ struct CumuloStep {
   /// l_{i-1} as this layer finds its band by.
   ScalarField level{0.0f};
   /// a_i(y) N_i(y) w_i(y): the displacement with the sign of its noise, which is smooth where the
-  /// displacement has a crease. 0 outside -reach - margin <= l_{i-1} <= margin.
+  /// displacement has a crease. 0 outside  -reach - 3/4 margin <= l_{i-1} <= margin.
   ScalarField displacement{0.0f};
   float bound = 0.0f;   ///< Largest |displacement|.
   float reach = 0.0f;   ///< What this layer and those after it can add.

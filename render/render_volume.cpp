@@ -28,6 +28,7 @@ constexpr std::uint8_t kFarthest = 32;
 
 RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density) : density_(std::move(density)) {
   require(density_ != nullptr, "render volume: no density given");
+  require(!density_->isPacked(), "render volume: the density must not be packed");
   const BrickGrid& grid = *density_;
   require(
       grid.background == 0.0f,

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "modeling/error.h"
 #include "tests/support/brick_grids.h"
 
 namespace nephele {
@@ -77,6 +78,34 @@ TEST(BrickGrid, KnowsItsBoxAndSize) {
   EXPECT_EQ(grid->worldBox(), (Box{{-3, 2, 3}, {5, 14, 7}}));
   EXPECT_GE(grid->memoryBytes(), 7u * BrickGrid::kVolume * sizeof(float));
   EXPECT_TRUE(BrickGrid{}.worldBox().isEmpty());
+}
+
+TEST(BrickGrid, PackingKeepsSamplesWithinHalfACode) {
+  const auto grid = denseGrid({-1, 0, 2}, {2, 2, 2}, scatter, {}, 7.0f);
+  BrickGrid packed = *grid;
+  pack(packed);
+  EXPECT_TRUE(packed.isPacked());
+  EXPECT_TRUE(packed.values.empty());
+  EXPECT_LT(packed.memoryBytes(), 0.55 * double(grid->memoryBytes()));
+  EXPECT_EQ(packed.ranges, grid->ranges);
+  for (int z = 16; z < 32; ++z)
+    for (int y = 0; y < 16; ++y)
+      for (int x = -8; x < 8; ++x) {
+        const Interval range = grid->ranges[std::size_t(grid->poolIndex(brickOf(Vec3i{x, y, z})))];
+        ASSERT_NEAR(packed.at({x, y, z}), grid->at({x, y, z}), (range.max - range.min) / 131070.0f + 1e-6f);
+      }
+  EXPECT_EQ(packed.at({100, 0, 0}), 7.0f);
+}
+
+TEST(BrickGrid, PackingKeepsConstantsExactlyAndRefusesWhatIsNotFinite) {
+  auto grid = denseGrid(
+      {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return 0.1f; }, {}, 0.1f);
+  BrickGrid packed = *grid;
+  pack(packed);
+  EXPECT_EQ(packed.at({3, 4, 5}), 0.1f);
+  grid->brick(1)[sampleOffset(3, 4, 5)] = std::numeric_limits<float>::infinity();
+  fillBorders(*grid);
+  EXPECT_THROW(pack(*grid), Error);
 }
 
 TEST(BrickRanges, AreExactForSmallRegionsAndContainLargeOnes) {

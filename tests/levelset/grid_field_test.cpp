@@ -8,6 +8,8 @@
 
 #include "levelset/grid_kernels.h"
 #include "modeling/error.h"
+#include "modeling/field_ops.h"
+#include "modeling/space.h"
 #include "tests/support/brick_grids.h"
 
 namespace nephele {
@@ -66,10 +68,16 @@ class EveryTarget : public testing::Test {
 
 // The plain loops are the truth; a vector kernel must give its bits on every instruction set this machine
 // has.
-TEST_F(EveryTarget, KernelsGiveTheBitsOfThePlainLoops) {
+class EveryTargetAndStorage : public EveryTarget, public testing::WithParamInterface<bool> {};
+
+INSTANTIATE_TEST_SUITE_P(Grids, EveryTargetAndStorage, testing::Values(false, true),
+                         [](const auto& storage) { return storage.param ? "Packed" : "Floats"; });
+
+TEST_P(EveryTargetAndStorage, KernelsGiveTheBitsOfThePlainLoops) {
   const std::int64_t targets = hwy::SupportedTargets();
   for (const Affine& map : {Affine{}, Affine{Mat3f::scaling(0.25f), {-1, 2, 0.5f}}, turned()}) {
     const auto grid = denseGrid({-2, -1, 0}, {3, 2, 2}, scatter, map, -0.5f);
+    if (GetParam()) pack(*grid);
     Points points;
     for (const Vec3f& q :
          {Vec3f{kNan, 0, 0}, Vec3f{0, kInfinity, 0}, Vec3f{0, 0, -kInfinity}, Vec3f{1e30f, 0, 0},
@@ -326,6 +334,37 @@ TEST(GridField, ReadsVectorsComponentByComponent) {
   EXPECT_EQ(gridsOf(field), (VectorGrids{a, b, c}));
   EXPECT_EQ(gridsOf(VectorField(Vec3f{})), VectorGrids{});
   EXPECT_NEAR(field.differenceStep(), 0.1f, 1e-6f);
+}
+
+TEST(GridField, ReadsPackedGridsWithinTheirRounding) {
+  const auto grid = denseGrid({-2, -1, 0}, {3, 2, 2}, scatter, turned(), -0.5f);
+  const auto packed = std::make_shared<BrickGrid>(*grid);
+  pack(*packed);
+  Points exact, rounded;
+  for (std::size_t i = 0; i < 2000; ++i) {
+    const Vec3f q = randomPoints(1, {-15, -7, 1}, {7, 7, 15}, unsigned(i)).point(0);
+    exact.add(turned()(q)), rounded.add(turned()(q));
+  }
+  for (const Interpolation interpolation : {Interpolation::trilinear, Interpolation::tricubic}) {
+    exact.evaluate(gridField(grid, interpolation));
+    rounded.evaluate(gridField(packed, interpolation));
+    // scatter lies within [-1, 1], and so do bricks: half a code, times (5/4)^3 for the weights of
+    // Catmull-Rom, and float rounding. Slopes take twice that per voxel of 0.1.
+    const float step = 2.0f / 131070.0f * 1.96f + 1e-6f;
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      ASSERT_NEAR(rounded.value[i], exact.value[i], step);
+      ASSERT_LE(length(rounded.gradient(i) - exact.gradient(i)), 2 * step * std::sqrt(3.0f) / 0.1f);
+    }
+  }
+}
+
+TEST(GridField, TakesRangesFromAnotherGrid) {
+  const auto grid = denseGrid({0, 0, 0}, {2, 1, 1}, [](const Vec3i& v) { return float(v.x); });
+  const ScalarField field = withRangesOf(*grid, dot(position(), VectorField(Vec3f{4, 0, 0})));
+  EXPECT_EQ(field({1.5f, 2, 2}), 6.0f);
+  // Samples of the first brick, with its border: 0 outside, then 0 to 9.
+  EXPECT_EQ(field.range({{1, 1, 1}, {2, 2, 2}}), gridField(grid).range({{1, 1, 1}, {2, 2, 2}}));
+  EXPECT_EQ(field.restrictedTo({{1, 1, 1}, {2, 2, 2}})({1.5f, 2, 2}), 6.0f);
 }
 
 TEST(GridField, RefusesGridsThatAreNotWhole) {

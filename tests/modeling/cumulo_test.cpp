@@ -81,7 +81,7 @@ TEST(Cumulo, OneLayerOnASphereIsRadiusPlusNoiseAtTheFootPoint) {
   int inBand = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float distance = radius - length(points[i]);
-    // The band is one voxel wider than promised on either side; its edge is not tested.
+    // The band of ALGORITHMS 2.3, but for a voxel inside.
     if (distance < -reach - 3 * voxel || distance > 3 * voxel) continue;
     ++inBand;
     // Closed form, ALGORITHMS 2.4: l(x) = R + |N(R n)| - |x|.
