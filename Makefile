@@ -1,10 +1,11 @@
 # One word per job; the work is done by CMake. `make demo` and `make test` need nothing but Debian 12.
 
 PACKAGES := $(shell cat cmake/packages.txt)
+FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
 
-.PHONY: all deps build demo test bench docs format lint clean
+.PHONY: all deps build demo test test-farm bench docs format lint clean
 
 all: build
 
@@ -25,6 +26,12 @@ test: deps
 	cmake --build build
 	sh tests/check_includes.sh
 	ctest --test-dir build --output-on-failure --parallel 2
+
+# Starts a Slurm of its own, as root; not part of `make test`.
+test-farm: build
+	@dpkg -s $(FARM_PACKAGES) >/dev/null 2>&1 || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(FARM_PACKAGES)
+	$(SUDO) sh tests/farm/run.sh build/bin/nephele
 
 bench: deps
 	cmake --preset release -DNEPHELE_BUILD_TESTS=OFF -DNEPHELE_BUILD_BENCHMARKS=ON

@@ -28,6 +28,10 @@ class Run : public Progress {
   /// @throws Error naming the estimate, the limit and `remedy` (the option to change).
   void requireMemory(double estimatedBytes, const std::string& remedy) const;
 
+  /// The next `stages` stages, each as long as the others, take the whole run from the share `from` to `to`:
+  /// what farm software is told. Where a verb does not say, every stage takes half of what is left.
+  virtual void expect(double from, double to, int stages = 1) const = 0;
+
   /// A line of result on stdout.
   virtual void result(const std::string& line) const = 0;
 
@@ -49,6 +53,7 @@ Verb levelsetVerb();
 Verb cloudVerb();
 Verb meshVerb();
 Verb renderVerb();
+Verb turntableVerb();
 Verb infoVerb();
 
 /// Parses the command line, runs one verb, and returns the exit code: 0 success, 1 failed, 2 usage, 128 +

@@ -7,5 +7,6 @@ int main(int argc, char** argv) {
   // The allocator raises this limit by itself and then keeps what large vectors leave behind, stage after
   // stage.
   mallopt(M_MMAP_THRESHOLD, 1 << 17);
-  return runProgram(argc, argv, {levelsetVerb(), cloudVerb(), meshVerb(), renderVerb(), infoVerb()});
+  return runProgram(argc, argv,
+                    {levelsetVerb(), cloudVerb(), meshVerb(), renderVerb(), turntableVerb(), infoVerb()});
 }

@@ -79,22 +79,60 @@ CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, cons
   return option;
 }
 
-CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
-                       const std::string& description) {
+namespace {
+
+CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
+                       const std::function<void(double)>& set, const std::string& description) {
   const std::string allowed = high < std::numeric_limits<double>::max()
                                   ? fmt::format("a number from {:g} to {:g}", low, high)
                                   : fmt::format("a number of at least {:g}", low);
   auto* option = app.add_option_function<std::string>(
       name,
-      [&target, name, low, high, allowed](const std::string& text) {
+      [name, low, high, allowed, set](const std::string& text) {
         const auto value = parseNumber(text);
         if (!value || *value < low || *value > high) refuseValue(name, text, allowed);
-        target = *value;
+        set(*value);
       },
       description);
   option->type_name("NUMBER");
-  option->default_str(fmt::format("{:g}", target));
   return option;
+}
+
+}  // namespace
+
+CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
+                       const std::string& description) {
+  return addNumber(
+             app, name, low, high, [&target](double value) { target = value; }, description)
+      ->default_str(fmt::format("{:g}", target));
+}
+
+CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
+                         double high, const std::string& description) {
+  return addNumber(
+      app, name, low, high, [&target](double value) { target = value; }, description);
+}
+
+CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
+                        double low, double high, const std::function<void(const Vec3f&)>& set,
+                        const std::string& description) {
+  constexpr double any = std::numeric_limits<double>::max();
+  const std::string allowed = low > -any ? fmt::format("{}, each {} to {:g}", form, low, high) : form;
+  const std::string wanted = high < any   ? allowed
+                             : low > -any ? fmt::format("{}, each at least {:g}", form, low)
+                                          : form;
+  return app
+      .add_option_function<std::string>(
+          name,
+          [=](const std::string& text) {
+            const std::vector<double> numbers = parseNumbers(name, text, wanted);
+            bool fits = numbers.size() == count;
+            for (const double number : numbers) fits = fits && number >= low && number <= high;
+            if (!fits) refuseValue(name, text, wanted);
+            set({float(numbers[0]), float(numbers[1]), count > 2 ? float(numbers[2]) : 0.0f});
+          },
+          description)
+      ->type_name(form);
 }
 
 CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int low, int high,

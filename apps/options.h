@@ -1,6 +1,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,6 +46,13 @@ CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, cons
 /// A finite number in [low, high].
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
                        const std::string& description);
+/// As addNumber, for a number that need not be given.
+CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
+                         double high, const std::string& description);
+/// A list of `count` (2 or 3) numbers, each within [low, high], shown as `form` ("X,Y,Z").
+CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
+                        double low, double high, const std::function<void(const Vec3f&)>& set,
+                        const std::string& description);
 CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int low, int high,
                       const std::string& description);
 /// One of a few words, each standing for a value.

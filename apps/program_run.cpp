@@ -124,6 +124,14 @@ void ProgramRun::endStage() const {
   stage_.clear();
 }
 
+void ProgramRun::expect(double from, double to, int stages) const {
+  const std::lock_guard lock(mutex_);
+  from_ = from;
+  to_ = to;
+  expectedStages_ = stages;
+  expectedFrom_ = stages_.size();
+}
+
 void ProgramRun::advance(double fraction) const {
   const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - start_).count();
   auto last = lastDrawn_.load(std::memory_order_relaxed);
@@ -134,8 +142,11 @@ void ProgramRun::advance(double fraction) const {
 
 void ProgramRun::draw(double fraction) const {
   if (options_.progress == "alf") {
-    // Stages are not known ahead, so the whole is taken to approach its end with each of them.
-    const double whole = 1 - std::pow(0.5, double(stages_.size()) - 1 + fraction);
+    const double passed = double(stages_.size() - expectedFrom_) - 1 + fraction;
+    // Where stages are not known ahead, the whole is taken to approach its end with each of them.
+    const double share =
+        expectedStages_ > 0 ? std::clamp(passed / expectedStages_, 0.0, 1.0) : 1 - std::pow(0.5, passed);
+    const double whole = from_ + (to_ - from_) * share;
     const int percent = int(whole * 100);
     if (percent > farmPercent_) {
       farmPercent_ = percent;

@@ -30,6 +30,7 @@ class ProgramRun : public Run {
   void advance(double fraction) const override;
   void note(std::string_view message) const override;
   bool cancelled() const override;
+  void expect(double from, double to, int stages) const override;
   void result(const std::string& line) const override;
 
   /// Ends the last stage and clears the bar. Call before anything else is printed.
@@ -55,6 +56,9 @@ class ProgramRun : public Run {
   mutable Clock::time_point stageStart_;
   mutable nlohmann::json stages_ = nlohmann::json::array();
   mutable bool barShown_ = false;
+  mutable double from_ = 0, to_ = 1;
+  mutable int expectedStages_ = 0;
+  mutable std::size_t expectedFrom_ = 0;  // stages before the expected ones
   mutable int farmPercent_ = -1;
   mutable std::int64_t lastLine_ = 0;
   mutable std::atomic<std::int64_t> lastDrawn_{0};

@@ -2,7 +2,9 @@
 
 #include <memory>
 
+#include "apps/object_options.h"
 #include "apps/render_options.h"
+#include "render/backdrop.h"
 #include "render/exr_io.h"
 #include "render/png_io.h"
 
@@ -10,38 +12,71 @@ namespace nephele::apps {
 namespace {
 
 struct RenderVerbOptions {
-  std::string input, output, preview;
+  std::vector<std::string> inputs;
+  std::string output, preview, deep, holdout;
+  ObjectOptions objects;
   PictureOptions picture;
 };
 
 void bindOptions(CLI::App& app, RenderVerbOptions& options) {
-  app.add_option("input", options.input, "Density to look at (.vdb, .nvdb).")->required()->type_name("FILE");
+  app.add_option("input", options.inputs,
+                 "Densities to look at (.vdb, .nvdb); where they overlap they add up.")
+      ->required()
+      ->type_name("FILE");
   addOutput(app, "-o,--output", options.output, {".exr"}, "Picture to write: linear, premultiplied.")
       ->required();
   addOutput(app, "--preview", options.preview, {".png"}, "The same for the screen, before the sky.");
+  addOutput(app, "--deep", options.deep, {".exr"},
+            "The picture with depth: samples that give the picture when they are flattened.");
+  app.add_option(
+         "--holdout", options.holdout,
+         "Deep picture (.exr) of what stands in front, for the same camera: of what is behind it only "
+         "the share is kept that it lets through.")
+      ->type_name("FILE");
   addPictureOptions(app, options.picture);
+  addShadowOutput(app, options.picture.light);
+  addObjectOptions(app, options.objects);
+}
+
+// What there is beside the volume, and depth.
+void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, const Camera& camera,
+               PictureOptions& picture, const Run& run) {
+  if (picture.pathTraced && !(options.deep.empty() && options.holdout.empty()))
+    refuseValue(options.deep.empty() ? "--holdout" : "--deep",
+                options.deep.empty() ? options.holdout : options.deep, "--integrator march");
+  picture.render.surfaces = options.objects.surfaces(volume);
+  if (picture.pathTraced && picture.render.surfaces)
+    refuseValue("--integrator", "path", "march, where there are objects");
+  if (!options.deep.empty()) picture.render.deep.emplace();
+  if (!options.holdout.empty())
+    picture.render.holdout = readHoldout(options.holdout, camera, run.memoryLimitBytes);
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
-  const RenderVolume volume = readDensity(options.input, options.picture.grid, run);
-  if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so is its picture");
-  const PictureOptions picture = options.picture.resolved(volume);
+  const RenderVolume volume =
+      readVolumes(options.inputs, options.picture.volumes, options.picture.shutter, run);
+  if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
+  PictureOptions picture = options.picture.resolved(volume);
   const Camera camera = picture.camera(volume);
+  addOthers(options, volume, camera, picture, run);
   run.requireMemory(
       double(volume.memoryBytes()) + estimateRenderBytes(volume, picture.lights, camera, picture.render),
       "make the picture smaller (--size), or the volume with larger voxels");
 
-  const RenderResult result =
-      renderImage(volume, picture.medium, picture.lights, camera, picture.render, run);
+  picture.light.writeShadows(volume, picture.lights, picture.medium, run);
+  RenderResult result = picture.picture(volume, camera, run);
+  if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
   run.begin("write");
   auto metadata = run.metadata();
   metadata["seed"] = std::to_string(picture.render.seed);
   metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
   writeExr(options.output, result.image, camera, metadata);
+  if (result.deep) writeDeepExr(options.deep, *result.deep, camera, metadata);
   if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
 
   run.stats["rays"] = result.rays;
   run.stats["samples"] = result.samples;
+  if (result.deep) run.stats["deep_samples"] = result.deep->sampleCount();
   run.stats["light_seconds"] = result.lightSeconds;
   run.stats["march_seconds"] = result.marchSeconds;
   run.stats["extinction"] = *picture.extinction;

@@ -69,6 +69,31 @@ bool isScalar(const openvdb::GridBase& grid) {
   return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
 }
 
+// One float grid per component, with the tree's own tiles.
+template <class VectorGrid>
+std::array<VdbGrid, 3> components(const VectorGrid& grid) {
+  const auto component = [&](int axis) {
+    const auto background = float(grid.background()[axis]);
+    const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree(), background, openvdb::TopologyCopy());
+    const auto values = grid.getConstAccessor();
+    for (auto voxel = tree->beginValueOn(); voxel; ++voxel)
+      voxel.setValue(float(values.getValue(voxel.getCoord())[axis]));
+    const auto scalar = openvdb::FloatGrid::create(tree);
+    scalar->insertMeta(grid);
+    scalar->setGridClass(openvdb::GRID_UNKNOWN);
+    const auto transform = grid.transform().copy();
+    if (grid.getGridClass() == openvdb::GRID_STAGGERED) {
+      openvdb::Vec3d shift(0, 0, 0);
+      shift[axis] = -0.5;
+      transform->preTranslate(shift);
+    }
+    scalar->setTransform(transform);
+    scalar->setName(fmt::format("{}.{}", grid.getName(), "xyz"[axis]));
+    return detail::wrapGrid(scalar);
+  };
+  return {component(0), component(1), component(2)};
+}
+
 }  // namespace
 
 std::vector<VdbGrid> readVdbFile(const std::string& path) {
@@ -96,6 +121,23 @@ VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
                                     name, grid->valueType()));
   }
   if (name.empty()) failReading(path, "no scalar (float or double) grid; " + listGrids(grids));
+  failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
+}
+
+std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name) {
+  const auto grids =
+      readGrids(path, [&](const auto&, const std::string& gridName) { return gridName == name; });
+  for (const auto& grid : grids) {
+    if (grid->getName() != name) continue;
+    return translateReadErrors(path, [&]() -> std::array<VdbGrid, 3> {
+      if (grid->isType<openvdb::Vec3SGrid>())
+        return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
+      if (grid->isType<openvdb::Vec3DGrid>())
+        return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
+      failReading(path,
+                  fmt::format("grid '{}' holds {} values; a grid of vectors is needed", name, grid->valueType()));
+    });
+  }
   failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
 }
 

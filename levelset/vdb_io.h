@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -53,6 +54,12 @@ std::vector<VdbGrid> readVdbFile(const std::string& path);
 /// grids become float.
 /// @throws Error naming the path, the name and the grids that are there.
 VdbGrid readScalarGrid(const std::string& path, const std::string& name = {});
+
+/// The three components of the vector grid called `name`, as scalar grids. Those of a staggered grid stand on
+/// the faces of its voxels: half a voxel below, each along its own axis. A grid of double vectors becomes
+/// float.
+/// @throws Error naming the path, the name and the grids that are there.
+std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name);
 
 /// Bricks of a scalar grid. A level set changes sign (positive inside); fog keeps its values.
 std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid);

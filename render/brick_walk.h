@@ -10,6 +10,7 @@ namespace nephele::detail {
 
 /// Optical depth at which the opacity is 0.5 %, from where on a ray counts as having met something.
 inline constexpr float kVisibleDepth = 0.0050125418f;
+inline constexpr float kVisibleOpacity = 0.005f;
 
 /// Calls visit(s0, s1, pool brick) for every brick with density that a ray passes, near to far, until it
 /// returns false.

@@ -23,6 +23,7 @@
 
 #include "levelset/output_file.h"
 #include "modeling/error.h"
+#include "render/exr_header.h"
 #include "render/image_file.h"
 
 namespace nephele {
@@ -87,6 +88,9 @@ detail::ImageHeader headerOf(const std::string& path, const Imf::Header& header)
   detail::requireSize(path, width, height, channels);
   result.width = int(width);
   result.height = int(height);
+  const Imath::Box2i& screen = header.displayWindow();
+  result.display = {window.min.x - screen.min.x, window.min.y - screen.min.y, screen.max.x - screen.min.x + 1,
+                    screen.max.y - screen.min.y + 1};
   static constexpr const char* kCompressions[] = {"none",  "rle", "zips", "zip",  "piz",
                                                   "pxr24", "b44", "b44a", "dwaa", "dwab"};
   const auto compression = std::size_t(header.compression());
@@ -100,15 +104,29 @@ detail::ImageHeader headerOf(const std::string& path, const Imf::Header& header)
 
 }  // namespace
 
-void writeExr(const std::string& path, const Image& image, const Camera& camera,
-              const std::map<std::string, std::string>& metadata) {
-  require(image.width > 0 && image.height > 0 && !image.channels.empty(), "exr: the image is empty");
-  Imf::Header header(image.width, image.height);
+Imath::Box2i detail::dataWindow(int width, int height, const std::optional<Image::Display>& display) {
+  const Image::Display d = display.value_or(Image::Display{0, 0, width, height});
+  return Imath::Box2i({d.x, d.y}, {d.x + width - 1, d.y + height - 1});
+}
+
+Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::Display>& display,
+                              const Camera& camera, const std::map<std::string, std::string>& metadata) {
+  const Image::Display d = display.value_or(Image::Display{0, 0, width, height});
+  Imf::Header header(Imath::Box2i({0, 0}, {d.width - 1, d.height - 1}), dataWindow(width, height, display));
   header.compression() = Imf::ZIP_COMPRESSION;
+  header.screenWindowWidth() = float(camera.screenWidth());
   Imf::addChromaticities(header, Imf::Chromaticities());
   Imf::addWorldToCamera(header, matrix(camera.worldToCamera()));
   Imf::addWorldToNDC(header, matrix(camera.worldToNdc()));
   for (const auto& [name, value] : metadata) header.insert(name, Imf::StringAttribute(value));
+  return header;
+}
+
+void writeExr(const std::string& path, const Image& image, const Camera& camera,
+              const std::map<std::string, std::string>& metadata) {
+  require(image.width > 0 && image.height > 0 && !image.channels.empty(), "exr: the image is empty");
+  const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
+  Imf::Header header = detail::exrHeader(image.width, image.height, image.display, camera, metadata);
 
   Imf::FrameBuffer frame;
   std::vector<std::vector<half>> halves;
@@ -119,12 +137,11 @@ void writeExr(const std::string& path, const Image& image, const Camera& camera,
     if (channel.half) {
       std::vector<half>& values = halves.emplace_back(channel.values.size());
       std::transform(channel.values.begin(), channel.values.end(), values.begin(), toHalf);
-      frame.insert(channel.name, Imf::Slice(Imf::HALF, reinterpret_cast<char*>(values.data()), sizeof(half),
-                                            pitch * sizeof(half)));
+      frame.insert(channel.name,
+                   Imf::Slice::Make(Imf::HALF, values.data(), window, sizeof(half), pitch * sizeof(half)));
     } else {
-      // OpenEXR only reads through the pointer when it writes a file.
-      char* values = reinterpret_cast<char*>(const_cast<float*>(channel.values.data()));
-      frame.insert(channel.name, Imf::Slice(Imf::FLOAT, values, sizeof(float), pitch * sizeof(float)));
+      frame.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.values.data(), window, sizeof(float),
+                                                  pitch * sizeof(float)));
     }
   }
   OutputFile output(path);
@@ -142,7 +159,7 @@ void detail::readExrFile(const std::string& path, const ImageReader& reader) {
   try {
     bool tiled = false, deep = false;
     require(Imf::isOpenExrFile(path.c_str(), tiled, deep), path + ": is not a whole OpenEXR file");
-    require(!deep, path + ": is a deep image, which is not read");
+    require(!deep, path + ": is a deep image, where a flat one is needed");
     Imf::InputFile file(path.c_str());
     const ImageHeader header = headerOf(path, file.header());
     reader.begin(header);

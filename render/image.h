@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "modeling/math.h"
+#include "render/camera.h"
 
 namespace nephele {
 
@@ -18,8 +21,21 @@ struct Image {
     std::vector<float> values;
   };
 
+  /// Where the pixels lie in a larger picture, the display window of EXR files.
+  struct Display {
+    /// Of the upper left pixel in it.
+    int x = 0, y = 0;
+    int width = 0, height = 0;
+    bool operator==(const Display&) const = default;
+  };
+
   int width = 0, height = 0;
+  /// The whole picture, where this is only a part of it or more than it.
+  std::optional<Display> display{};
   std::vector<Channel> channels;
+
+  /// Before channels are added: makes this the part `window` of a picture of displayWidth x displayHeight.
+  void setWindow(const PixelBox& window, int displayWidth, int displayHeight);
 
   /// Appends a channel of zeros; the reference is valid until the next one is added.
   Channel& add(const std::string& name, bool half = true);
@@ -39,12 +55,16 @@ struct Image {
 struct ViewTransform {
   float exposureStops = 0.0f;
   float shoulder = 0.6f;
-  /// Linear radiance behind the picture.
+  /// Linear radiance behind pictures that have no layer `backdrop`.
   Vec3f background{};
 };
 
 /// Screen values in [0, 1], three per pixel, of R, G, B and A of `image`. @throws Error if one of them is
 /// missing.
 std::vector<float> displayed(const Image& image, const ViewTransform& view);
+
+/// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands still
+/// from frame to frame.
+std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view);
 
 }  // namespace nephele

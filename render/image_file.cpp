@@ -49,6 +49,8 @@ Image readImage(const std::string& path) {
   detail::readFile(path, {[&](const detail::ImageHeader& header) {
                             image.width = header.width;
                             image.height = header.height;
+                            if (header.display != Image::Display{0, 0, header.width, header.height})
+                              image.display = header.display;
                             for (const auto& channel : header.channels)
                               image.add(channel.name, channel.type != "float");
                           },

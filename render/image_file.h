@@ -1,9 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "render/image.h"
 
 namespace nephele::detail {
 
@@ -16,6 +19,8 @@ struct ImageHeader {
 
   std::string format;
   int width = 0, height = 0;
+  /// Where the pixels lie in the picture that is meant, if the format knows such a thing.
+  std::optional<Image::Display> display;
   std::vector<Channel> channels;
   /// Name and value, in the order of the file.
   std::vector<std::pair<std::string, std::string>> attributes;

@@ -257,6 +257,40 @@ void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const
     }
 }
 
+void LightVolume::add(const std::function<float(const Vec3f& world)>& column) {
+  const Affine toWorld = inverse(worldToLattice_);
+  parallelFor(table_.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t entry = begin; entry != end; ++entry) {
+      if (table_[entry] == 0) continue;
+      const Vec3i brick{int(entry % std::size_t(brickCount_.x)),
+                        int(entry / std::size_t(brickCount_.x) % std::size_t(brickCount_.y)),
+                        int(entry / std::size_t(brickCount_.x) / std::size_t(brickCount_.y))};
+      const Vec3i first = (firstBrick_ + brick) * kBrick;
+      float* values = values_.data() + std::size_t(table_[entry]) * kVolume;
+      for (int z = 0; z != kWidth; ++z)
+        for (int y = 0; y != kWidth; ++y)
+          for (int x = 0; x != kWidth; ++x) *values++ += column(toWorld(Vec3f(first + Vec3i{x, y, z})));
+    }
+  });
+}
+
+void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
+  const Affine latticeToWorld = inverse(worldToLattice_);
+  parallelFor(table_.size(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t entry = begin; entry != end; ++entry) {
+      if (!table_[entry]) continue;
+      const auto nx = std::size_t(brickCount_.x), ny = std::size_t(brickCount_.y);
+      const Vec3i brick =
+          firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))};
+      float* out = values_.data() + std::size_t(table_[entry]) * kVolume;
+      for (int k = 0; k != kWidth; ++k)
+        for (int j = 0; j != kWidth; ++j)
+          for (int i = 0; i != kWidth; ++i)
+            *out++ = column(latticeToWorld(Vec3f(brick * kBrick + Vec3i{i, j, k})));
+    }
+  });
+}
+
 float LightVolume::columnDensity(const Vec3f& world) const {
   if (table_.empty()) return 0.0f;
   const Vec3f p = worldToLattice_(world);

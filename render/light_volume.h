@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <functional>
 #include <vector>
 
 #include "modeling/progress.h"
@@ -26,6 +28,9 @@ class LightVolume {
   /// @throws Error if `towards` is zero or not finite.
   LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent());
 
+  /// Sets c at every node to `column` of its place in the world, in place of the sweep's. Uses all cores.
+  void replace(const std::function<float(const Vec3f&)>& column);
+
   /// From world space to this lattice, whose nodes are integers.
   const Affine& worldToLattice() const { return worldToLattice_; }
   Vec3i firstBrick() const { return firstBrick_; }
@@ -34,6 +39,10 @@ class LightVolume {
   const std::vector<std::int32_t>& table() const { return table_; }
   /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells.
   const std::vector<float>& values() const { return values_; }
+
+  /// Adds column(world) to c at every node that is kept, for what stands in the light beside the density.
+  /// `column` is called from many threads.
+  void add(const std::function<float(const Vec3f& world)>& column);
 
   /// c at a world-space point. Slow; for tests.
   float columnDensity(const Vec3f& world) const;

@@ -5,8 +5,7 @@
 // exactly, whatever the steps are.
 //
 // Steps are gathered into blocks of 16 that run across bricks. A block is looked up as vectors: brick table,
-// then the eight corners, in the density, in every sun's column densities and in the sky's visibility. Octave
-// n of a sun needs exp(-depth / 2^n): one exponential for the last octave, squared for each one before it.
+// then the eight corners, in the density, in every sun's column densities and in the scattered light.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE
@@ -86,20 +85,27 @@ HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
   return trilinear(bricks.values, base, local, kWidth, plane);
 }
 
-HWY_INLINE Floats sampleSky(const MarchScene& scene, Point p) {
+// Three values at once, at p within bricks that are laid out as the density's.
+HWY_INLINE void sampleColour(const MarchScene::ColourBricks& bricks, Point p, Floats (&out)[3]) {
+  for (int c = 0; c != 3; ++c)
+    out[c] = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
+                         {bricks.values[c], bricks.table, bricks.count}, p),
+                     hn::Zero(Lanes()));
+}
+
+HWY_INLINE Point clamped(Point p, const Vec3i& size) {
   const Lanes d;
-  const auto clamped = [&](Floats x, int count) HWY_ATTR {
+  const auto within = [&](Floats x, int count) HWY_ATTR {
     return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, float(count - 1) - 1e-3f));
   };
-  const Point q{clamped(p.x, scene.skySize.x), clamped(p.y, scene.skySize.y), clamped(p.z, scene.skySize.z)};
-  return trilinear(scene.sky, hn::Zero(IntLanes()), q, scene.skySize.x, scene.skySize.x * scene.skySize.y);
+  return {within(p.x, size.x), within(p.y, size.y), within(p.z, size.z)};
 }
 
 // One ray's march: collects steps, and adds a block of them at a time.
 class Marcher {
  public:
-  Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result)
-      : scene_(scene), ray_(ray), result_(result) {}
+  Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result, MarchRecord* record)
+      : scene_(scene), ray_(ray), result_(result), record_(record), isHeld_(!ray.holdout.empty()) {}
 
   // `count` steps of length `ds` from `start` on. False once the ray is as good as opaque.
   bool take(float start, float ds, int count) {
@@ -117,7 +123,7 @@ class Marcher {
       count_ += taken;
       count -= taken;
       start += float(taken) * ds;
-      if (count_ == kBlock && !flush()) return false;
+      if (count_ == kBlock && (!flush() || isHidden_)) return false;
     }
     return true;
   }
@@ -125,6 +131,7 @@ class Marcher {
   void finish() {
     if (count_ > 0) flush();
     result_.opticalDepth = depth_;
+    if (record_) mark();
   }
 
  private:
@@ -149,12 +156,16 @@ class Marcher {
     alignas(64) float after[kBlock];
     const float start = depth_;
     for (int i = 0; i != kBlock; ++i) after[i] = depth_ += depth[i];
-    if (depth_ == start) return true;
-    if (start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
+    if (depth_ == start && !scene_.emission.table) return true;
+    if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
       while (after[first] <= detail::kVisibleDepth) ++first;
       result_.distance = ray_.start + s_[first];
     }
+
+    if (isHeld_) hold(start, after, used);
+    if (record_) record(start, after, used);
+    if (scene_.isColoured()) return flushColours(depth, after);
 
     alignas(64) float through[kBlock + 1];
     through[0] = through_;
@@ -164,52 +175,296 @@ class Marcher {
     }
     through_ = through[kBlock];
     for (std::size_t i = 0; i < kBlock; i += lanes) {
-      const Floats weight = hn::Sub(hn::LoadU(d, through + i), hn::LoadU(d, through + i + 1));
+      Floats weight = hn::Sub(hn::LoadU(d, through + i), hn::LoadU(d, through + i + 1));
+      if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
       if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
-      light(hn::Load(d, s_ + i), weight);
+      light(hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {weight});
     }
     return through_ > scene_.cutoff;
   }
 
-  void light(Floats s, Floats weight) {
+  // What the holdout leaves of every step, and of its opacity.
+  void hold(float before, const float* after, int used) {
+    for (int i = 0; i != used; ++i) {
+      const float middle = ray_.start + s_[i] + (0.5f - ray_.jitter) * ds_[i];
+      seen_[i] = ray_.holdout.transmittance(middle * ray_.cosine, holdoutCursor_);
+      for (int c = 0; c != 3; ++c) {
+        const float share = scene_.extinctionColour[c];
+        result_.heldOpacity[c] += seen_[i] * (std::exp(-std::min(before * share, 80.0f)) -
+                                              std::exp(-std::min(after[i] * share, 80.0f)));
+      }
+      before = after[i];
+      if (std::isinf(result_.distance) && isVisible(result_.heldOpacity))
+        result_.distance = ray_.start + s_[i];
+    }
+    for (int i = used; i != kBlock; ++i) seen_[i] = seen_[used - 1];
+    isHidden_ = seen_[used - 1] <= scene_.cutoff;
+  }
+
+  static bool isVisible(const float* opacity) {
+    return opacity[0] + opacity[1] + opacity[2] > 3 * detail::kVisibleOpacity;
+  }
+
+  void mark() { record_->marks.push_back({record_->steps.size(), result_}); }
+
+  // The steps of a block, before its light is added.
+  void record(float before, const float* after, int used) {
+    mark();
+    float opacity = record_->steps.empty() ? 0.0f : record_->steps.back().opacity;
+    for (int i = 0; i != used; ++i) {
+      if (after[i] == before && !scene_.emission.table) continue;
+      const float gain = scene_.meanOpacity(after[i]) - scene_.meanOpacity(before);
+      opacity = isHeld_ ? opacity + seen_[i] * gain : scene_.meanOpacity(after[i]);
+      const float begin = s_[i] - ray_.jitter * ds_[i];
+      record_->steps.push_back({begin, begin + ds_[i], opacity});
+      before = after[i];
+    }
+  }
+
+  // The same where colours differ in more than their albedo: `after` are optical depths behind the steps,
+  // `depth` their own.
+  bool flushColours(const float* depth, const float* after) {
     const Lanes d;
-    const float least = scene_.extinction / float(1 << (scene_.octaves - 1));
+    const std::size_t lanes = hn::Lanes(d);
+    alignas(64) float through[3][kBlock + 1];
+    for (int c = 0; c != 3; ++c) {
+      through[c][0] = throughColours_[c];
+      const Floats share = hn::Set(d, -scene_.extinctionColour[c]);
+      for (std::size_t i = 0; i < kBlock; i += lanes) {
+        const Floats tau = hn::Max(hn::Mul(hn::Load(d, after + i), share), hn::Set(d, -80.0f));
+        hn::StoreU(hn::Exp(d, tau), d, through[c] + 1 + i);
+      }
+      throughColours_[c] = through[c][kBlock];
+    }
+    for (std::size_t i = 0; i < kBlock; i += lanes) {
+      const Floats s = hn::Load(d, s_ + i), own = hn::Load(d, depth + i);
+      Floats weight[3];
+      for (int c = 0; c != 3; ++c)
+        weight[c] = hn::Sub(hn::LoadU(d, through[c] + i), hn::LoadU(d, through[c] + i + 1));
+      const Floats seen = isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f);
+      if (scene_.emission.table) {
+        // T (1 - exp(-t)) / t, by its series where the difference would lose its digits.
+        Floats glow[3];
+        sampleColour(scene_.emission, pointAt(ray_.density, s), glow);
+        const Floats step =
+            hn::Mul(hn::Load(d, ds_ + i), hn::Set(d, scene_.extinction * scene_.emissionScale));
+        for (int c = 0; c != 3; ++c) {
+          const Floats t = hn::Mul(own, hn::Set(d, scene_.extinctionColour[c]));
+          const Floats thin = hn::NegMulAdd(
+              t, hn::NegMulAdd(t, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
+          const Floats mean =
+              hn::IfThenElse(hn::Lt(t, hn::Set(d, 0.03f)), hn::Mul(hn::LoadU(d, through[c] + i), thin),
+                             hn::Div(weight[c], hn::Max(t, hn::Set(d, 0.03f))));
+          result_.emission[c] +=
+              hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(glow[c], step), hn::Mul(mean, seen))));
+        }
+      }
+      if (scene_.colour.table) {
+        const Floats density = hn::Div(
+            own, hn::Max(hn::Mul(hn::Load(d, ds_ + i), hn::Set(d, scene_.extinction)), hn::Set(d, 1e-30f)));
+        const auto some = hn::Gt(density, hn::Set(d, 1e-30f));
+        Floats colour[3];
+        sampleColour(scene_.colour, pointAt(ray_.density, s), colour);
+        for (int c = 0; c != 3; ++c)
+          weight[c] = hn::Mul(weight[c], hn::IfThenElseZero(some, hn::Div(colour[c], density)));
+      }
+      for (Floats& one : weight) one = hn::Mul(one, seen);
+      light(s, hn::Load(d, ds_ + i), weight);
+    }
+    return std::max({throughColours_[0], throughColours_[1], throughColours_[2]}) > scene_.cutoff;
+  }
+
+  // Adds the light that steps of one weight, or of one for each colour, send to the eye.
+  template <int kColours>
+  void light(Floats s, Floats ds, const Floats (&weight)[kColours]) {
+    const Lanes d;
     for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
       const Floats column =
           sampleBricks<LightVolume::kWidth, 0>(scene_.suns[sun], pointAt(ray_.suns[sun], s));
-      const Floats last = hn::Min(hn::Mul(hn::Max(column, hn::Zero(d)), hn::Set(d, least)),
-                                  hn::Set(d, 80.0f / float(1 << (scene_.octaves - 1))));
-      const Floats first = hn::Exp(d, hn::Neg(last));
-      for (int c = 0; c != scene_.colours; ++c) {
-        Floats power = first, sum = hn::Zero(d);
-        for (int n = scene_.octaves - 1; n >= 0; --n) {
-          sum = hn::MulAdd(power, hn::Set(d, ray_.weight[sun][c][n]), sum);
-          power = hn::Mul(power, power);
+      const Floats depth = hn::Mul(hn::Max(column, hn::Zero(d)), hn::Set(d, scene_.extinction));
+      for (int n = 0; n != scene_.octaves; ++n) {
+        if constexpr (kColours == 1) {
+          const float share = scene_.attenuation[n] * scene_.suns[sun].shadow[0];
+          const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, share)), hn::Set(d, 80.0f));
+          const Floats seen = hn::Mul(hn::Exp(d, hn::Neg(left)), weight[0]);
+          const float sum = hn::GetLane(hn::SumOfLanes(d, seen));
+          for (int c = 0; c != scene_.colours; ++c) result_.suns[sun][c] += sum * ray_.weight[sun][c][n];
+        } else {
+          for (int c = 0; c != kColours; ++c) {
+            const float share =
+                scene_.attenuation[n] * scene_.extinctionColour[c] * scene_.suns[sun].shadow[c];
+            const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, share)), hn::Set(d, 80.0f));
+            const Floats seen = hn::Mul(hn::Exp(d, hn::Neg(left)), weight[c]);
+            result_.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, seen)) * ray_.weight[sun][c][n];
+          }
         }
-        result_.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(sum, weight)));
       }
     }
-    if (scene_.sky) {
-      const Floats visible = sampleSky(scene_, pointAt(ray_.sky, s));
-      result_.sky += hn::GetLane(hn::SumOfLanes(d, hn::Mul(visible, weight)));
+    for (std::size_t i = 0; i != scene_.locals.size(); ++i) local(i, s, ds, weight);
+    if (!scene_.scattered.empty()) scattered(s, weight);
+    if constexpr (kColours == 3)
+      if (scene_.glow[0]) scatteredGlow(s, weight);
+  }
+
+  // The same for a light at a place. Within a step distance and angle change as the light goes by: taken are
+  // the mean of 1 / r^2, which is the angle that the step fills as seen from the light over its length and
+  // the distance of its line, and the phase function half way along that angle.
+  template <int kColours>
+  void local(std::size_t index, Floats s, Floats ds, const Floats (&weight)[kColours]) {
+    const Lanes d;
+    const MarchScene::Local& light = scene_.locals[index];
+    const MarchRay::Local& line = ray_.locals[index];
+    const Floats least = hn::Set(d, light.least), one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+    const Floats length = hn::Max(ds, least), away2 = hn::Set(d, line.distance2), away = hn::Sqrt(away2);
+    const Floats along = hn::Sub(s, hn::Set(d, line.closest));
+    const Floats first = hn::NegMulAdd(hn::Set(d, ray_.jitter), length, along), last = hn::Add(first, length);
+    const Floats r = hn::Sqrt(hn::MulAdd(along, along, away2));
+    Floats share = one;
+    {
+      Floats decay = one;
+      const Floats start = hn::Set(d, light.decayStart);
+      if (light.decay == 2) {
+        const Floats area = hn::Mul(away, length), x = hn::MulAdd(first, last, away2);
+        const Floats tangent = hn::Div(area, hn::IfThenElse(hn::Eq(x, zero), hn::Set(d, 1e-30f), x));
+        const Floats acute = hn::Atan(d, tangent);
+        const Floats angle =
+            hn::IfThenElse(hn::Lt(x, zero), hn::Add(acute, hn::Set(d, 3.14159265f)), acute);
+        decay = hn::Div(angle, area);
+        if (light.decayStart > 0)
+          decay = hn::IfThenElse(hn::Lt(r, start), hn::Div(one, hn::Mul(start, start)), decay);
+      } else if (light.decay == 1) {
+        decay = hn::Div(one, hn::Max(r, hn::Max(start, least)));
+      }
+      const Point q = pointAt(line.frame, s);
+      if (light.hasCone) {
+        const Floats c = hn::Div(
+            hn::MulAdd(q.x, hn::Set(d, light.axis.x),
+                       hn::MulAdd(q.y, hn::Set(d, light.axis.y), hn::Mul(q.z, hn::Set(d, light.axis.z)))),
+            hn::Max(r, least));
+        const Floats t = hn::Min(
+            hn::Max(hn::Mul(hn::Sub(c, hn::Set(d, light.outerCosine)), hn::Set(d, light.perCosine)), zero),
+            one);
+        decay = hn::Mul(
+            decay, hn::Mul(hn::Mul(t, t), hn::NegMulAdd(hn::Set(d, 2.0f), t, hn::Set(d, 3.0f))));
+        if (hn::AllTrue(d, hn::Eq(decay, zero))) return;
+      }
+      share = decay;
+    }
+    const Floats depth =
+        hn::Mul(hn::Max(localColumn(light, line, s), zero), hn::Set(d, scene_.extinction));
+
+    const Floats a = hn::Div(one, hn::Sqrt(hn::MulAdd(first, first, away2))),
+                 b = hn::Div(one, hn::Sqrt(hn::MulAdd(last, last, away2)));
+    const Floats across = hn::Mul(away, hn::Add(a, b)), forward = hn::MulAdd(first, a, hn::Mul(last, b));
+    const Floats norm = hn::Sqrt(hn::MulAdd(across, across, hn::Mul(forward, forward)));
+    const Floats sine = hn::Div(forward, hn::Max(norm, hn::Set(d, 1e-30f)));
+    const Floats place = hn::Mul(
+        hn::Sqrt(hn::Min(hn::Max(hn::Mul(hn::Add(one, sine), hn::Set(d, 0.5f)), zero), one)),
+        hn::Set(d, float(MarchScene::Local::kPhaseNodes) - 0.001f));
+    const IntLanes i;
+    const Ints node = hn::ConvertTo(i, place);
+    const Floats part = hn::Sub(place, hn::ConvertTo(d, node));
+
+    float* result = result_.suns[scene_.suns.size() + index];
+    for (int n = 0; n != scene_.octaves; ++n) {
+      const float* table = light.phase + n * (MarchScene::Local::kPhaseNodes + 1);
+      const Floats p0 = hn::GatherIndex(d, table, node), p1 = hn::GatherIndex(d, table + 1, node);
+      const Floats lit = hn::Mul(hn::MulAdd(part, hn::Sub(p1, p0), p0), share);
+      const auto seen = [&](float extinction, Floats of) HWY_ATTR {
+        const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, extinction)), hn::Set(d, 80.0f));
+        return hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(hn::Exp(d, hn::Neg(left)), lit), of)));
+      };
+      if constexpr (kColours == 1) {
+        const float sum = seen(scene_.attenuation[n] * light.shadow[0], weight[0]);
+        for (int c = 0; c != scene_.colours; ++c) result[c] += sum * light.albedo[c];
+      } else {
+        for (int c = 0; c != kColours; ++c)
+          result[c] += light.albedo[c] * seen(scene_.attenuation[n] * light.shadow[c] *
+                                                  scene_.extinctionColour[c],
+                                              weight[c]);
+      }
+    }
+  }
+
+  // Density between a light at a place and points of the ray.
+  HWY_INLINE Floats localColumn(const MarchScene::Local& light, const MarchRay::Local& line, Floats s) const {
+    const Lanes d;
+    const Point q = pointAt(line.frame, s);
+    const Floats x = hn::Abs(q.x), y = hn::Abs(q.y), z = hn::Abs(q.z);
+    Floats column = hn::Zero(d);
+    for (const MarchScene::Local::Face& face : light.faces) {
+      const Floats u = face.axis == 0 ? q.y : face.axis == 1 ? q.z : q.x,
+                   v = face.axis == 0 ? q.z : face.axis == 1 ? q.x : q.y,
+                   w = hn::Mul(face.axis == 0 ? q.x : face.axis == 1 ? q.y : q.z, hn::Set(d, face.side));
+      const auto inFront = hn::Gt(w, hn::Zero(d));
+      const auto mine = light.faces.size() == 1 ? inFront
+                        : face.axis == 0        ? hn::And(inFront, hn::And(hn::Ge(x, y), hn::Ge(x, z)))
+                        : face.axis == 1        ? hn::And(inFront, hn::And(hn::Gt(y, x), hn::Ge(y, z)))
+                                                : hn::And(inFront, hn::And(hn::Gt(z, x), hn::Gt(z, y)));
+      if (hn::AllFalse(d, mine)) continue;
+      const Floats depth = hn::Max(w, hn::Set(d, light.least)),
+                   scale = hn::Div(hn::Set(d, face.perTangent), depth);
+      const Point p{
+          hn::Sub(hn::MulAdd(u, scale, hn::Set(d, line.shift.x)), hn::Set(d, face.corner.x)),
+          hn::Sub(hn::MulAdd(v, scale, hn::Set(d, line.shift.y)), hn::Set(d, face.corner.y)),
+          hn::Sub(hn::MulAdd(depth, hn::Set(d, face.perDepth), hn::Set(d, line.shift.z)),
+                  hn::Set(d, face.corner.z))};
+      column = hn::IfThenElse(mine, sampleBricks<LightVolume::kWidth, 0>(face, p), column);
+    }
+    return column;
+  }
+
+  void scatteredGlow(Floats s, const Floats (&weight)[3]) {
+    const Lanes d;
+    const Vec3i size = scene_.scatteredSize;
+    const Point p = clamped(pointAt(ray_.scattered, s), size);
+    for (int c = 0; c != 3; ++c) {
+      const Floats there = trilinear(scene_.glow[c], hn::Zero(IntLanes()), p, size.x, size.x * size.y);
+      result_.emission[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[c])));
+    }
+  }
+
+  template <int kColours>
+  void scattered(Floats s, const Floats (&weight)[kColours]) {
+    const Lanes d;
+    const Vec3i size = scene_.scatteredSize;
+    const Point p = clamped(pointAt(ray_.scattered, s), size);
+    std::size_t lattice = 0;
+    for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
+      float* result = light < scene_.lightCount() ? result_.suns[light] : result_.sky;
+      for (int c = 0; c != scene_.colours; ++c) {
+        const float* values = scene_.scattered[lattice++];
+        if (!values) continue;
+        const Floats there = trilinear(values, hn::Zero(IntLanes()), p, size.x, size.x * size.y);
+        result[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[kColours == 1 ? 0 : c])));
+      }
     }
   }
 
   const MarchScene& scene_;
   const MarchRay& ray_;
   MarchResult& result_;
+  MarchRecord* record_;
+  const bool isHeld_;
+  // Nothing farther away is seen.
+  bool isHidden_ = false;
+  std::size_t holdoutCursor_ = 0;
+  alignas(64) float seen_[kBlock];
   alignas(64) float s_[2 * kBlock];
   alignas(64) float ds_[2 * kBlock];
   int count_ = 0;
   float depth_ = 0.0f;
   float through_ = 1.0f;
+  float throughColours_[3] = {1.0f, 1.0f, 1.0f};
 };
 
-void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, std::size_t count) {
+void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
+                std::size_t count) {
   for (std::size_t i = 0; i != count; ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
-    Marcher marcher(scene, rays[i], results[i]);
+    if (records) records[i].clear();
+    Marcher marcher(scene, rays[i], results[i], records ? records + i : nullptr);
     detail::forEachRun(scene, rays[i], [&](float s, float ds, int n) { return marcher.take(s, ds, n); });
     marcher.finish();
   }
@@ -226,9 +481,12 @@ namespace nephele {
 
 HWY_EXPORT(marchBatch);
 
-void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results) {
+void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,
+               std::span<MarchRecord> records) {
   require(rays.size() == results.size(), "march: as many results as rays are needed");
-  HWY_DYNAMIC_DISPATCH(marchBatch)(scene, rays.data(), results.data(), rays.size());
+  require(records.empty() || records.size() == rays.size(), "march: as many records as rays are needed");
+  HWY_DYNAMIC_DISPATCH(marchBatch)
+  (scene, rays.data(), results.data(), records.empty() ? nullptr : records.data(), rays.size());
 }
 
 namespace {
@@ -258,17 +516,95 @@ float sample(const MarchScene::Bricks& bricks, const Vec3f& p, int width, int be
                 width, plane);
 }
 
+float localColumn(const MarchScene::Local& light, const MarchRay::Local& line, const Vec3f& q) {
+  const Vec3f size{std::fabs(q.x), std::fabs(q.y), std::fabs(q.z)};
+  const int axis = light.faces.size() == 1                ? light.faces[0].axis
+                   : size.x >= size.y && size.x >= size.z ? 0
+                   : size.y >= size.z                     ? 1
+                                                          : 2;
+  for (const MarchScene::Local::Face& face : light.faces) {
+    if (face.axis != axis || !(q[axis] * face.side > 0)) continue;
+    const float depth = std::max(q[axis] * face.side, light.least);
+    const Vec3f p{q[(axis + 1) % 3] * face.perTangent / depth, q[(axis + 2) % 3] * face.perTangent / depth,
+                  depth * face.perDepth};
+    return sample(face, p + line.shift - face.corner, LightVolume::kWidth, 0);
+  }
+  return 0.0f;
+}
+
+// The light of a local over one step: see Marcher.
+void addLocal(const MarchScene& scene, const MarchRay& ray, std::size_t index, float s, float ds,
+              const float (&weight)[3], float (&result)[3]) {
+  const MarchScene::Local& light = scene.locals[index];
+  const MarchRay::Local& line = ray.locals[index];
+  const double length = double(std::max(ds, light.least)), away = std::sqrt(double(line.distance2));
+  const double along = double(s) - double(line.closest);
+  const double first = along - double(ray.jitter) * length, last = first + length;
+  const double r = std::hypot(along, away), a = std::atan2(first, away), b = std::atan2(last, away);
+  double decay = 1;
+  if (light.decay == 2)
+    decay = light.decayStart > 0 && r < double(light.decayStart)
+                ? 1 / (double(light.decayStart) * double(light.decayStart))
+                : (b - a) / (away * length);
+  if (light.decay == 1) decay = 1 / std::max(r, double(std::max(light.decayStart, light.least)));
+  const Vec3f q = line.frame.origin + line.frame.direction * s;
+  if (light.hasCone) {
+    const float c = dot(q, light.axis) / std::max(float(r), light.least);
+    const float t = std::clamp((c - light.outerCosine) * light.perCosine, 0.0f, 1.0f);
+    decay *= double(t * t * (3 - 2 * t));
+  }
+  const float column = scene.extinction * std::max(localColumn(light, line, q), 0.0f);
+  constexpr int nodes = MarchScene::Local::kPhaseNodes;
+  const double sine = std::sin((a + b) / 2);
+  const float place = float(std::sqrt(std::clamp((1 + sine) / 2, 0.0, 1.0))) * (float(nodes) - 0.001f);
+  const int node = int(place);
+  for (int n = 0; n != scene.octaves; ++n) {
+    const float* table = light.phase + n * (nodes + 1) + node;
+    const float phase = table[0] + (place - float(node)) * (table[1] - table[0]);
+    for (int c = 0; c != scene.colours; ++c)
+      result[c] += weight[c] * light.albedo[c] * phase * float(decay) *
+                   std::exp(-std::min(column * scene.attenuation[n] * scene.extinctionColour[c] *
+                                          light.shadow[c],
+                                      80.0f));
+  }
+}
+
 // One step; false once the ray is as good as opaque.
 bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds, MarchResult& result) {
+  std::size_t cursor = 0;
+  const float seen = ray.holdout.transmittance((ray.start + s + (0.5f - ray.jitter) * ds) * ray.cosine, cursor);
   const auto at = [s](const LatticeRay& line) { return line.origin + line.direction * s; };
   ++result.samples;
   const float density =
       std::max(sample(scene.density, at(ray.density), BrickGrid::kWidth, BrickGrid::kBefore), 0.0f);
-  if (density == 0) return true;
-  const float before = std::exp(-std::min(result.opticalDepth, 80.0f));
+  if (density == 0 && !scene.emission.table) return true;
+  const float depthBefore = result.opticalDepth;
   result.opticalDepth += scene.extinction * density * ds;
-  const float after = std::exp(-std::min(result.opticalDepth, 80.0f)), weight = before - after;
-  if (std::isinf(result.distance) && result.opticalDepth > detail::kVisibleDepth)
+  const auto through = [&](float depth, int c) {
+    return std::exp(-std::min(depth * scene.extinctionColour[c], 80.0f));
+  };
+  const auto threeAt = [&](const MarchScene::ColourBricks& bricks, int c) {
+    return std::max(sample({bricks.values[c], bricks.table, bricks.count}, at(ray.density), BrickGrid::kWidth,
+                           BrickGrid::kBefore),
+                    0.0f);
+  };
+  float weight[3], after = 0.0f;
+  for (int c = 0; c != 3; ++c) {
+    const float before = through(depthBefore, c), behind = through(result.opticalDepth, c);
+    weight[c] = (before - behind) * seen;
+    result.heldOpacity[c] += weight[c];
+    after = std::max(after, behind);
+    if (scene.emission.table) {
+      const double t = double(scene.extinction) * density * ds * scene.extinctionColour[c];
+      const double mean = t > 0 ? double(before) * -std::expm1(-t) / t : double(before);
+      result.emission[c] += scene.extinction * scene.emissionScale * ds * threeAt(scene.emission, c) * float(mean) * seen;
+    }
+    if (scene.colour.table) weight[c] *= density > 0 ? threeAt(scene.colour, c) / density : 0.0f;
+  }
+  const float* held = result.heldOpacity;
+  if (std::isinf(result.distance) &&
+      (ray.holdout.empty() ? result.opticalDepth > detail::kVisibleDepth
+                           : held[0] + held[1] + held[2] > 3 * detail::kVisibleOpacity))
     result.distance = ray.start + s;
   for (std::size_t sun = 0; sun != scene.suns.size(); ++sun) {
     const float column =
@@ -276,13 +612,30 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
     for (int c = 0; c != scene.colours; ++c)
       for (int n = 0; n != scene.octaves; ++n)
         result.suns[sun][c] +=
-            weight * ray.weight[sun][c][n] * std::exp(-std::min(column, 80.0f) / float(1 << n));
+            weight[c] * ray.weight[sun][c][n] *
+            std::exp(-std::min(column * scene.attenuation[n] * scene.extinctionColour[c] *
+                                   scene.suns[sun].shadow[c],
+                               80.0f));
   }
-  if (scene.sky) {
-    Vec3f p = at(ray.sky);
-    for (int axis = 0; axis != 3; ++axis)
-      p[axis] = std::clamp(p[axis], 0.0f, float(scene.skySize[axis] - 1) - 1e-3f);
-    result.sky += weight * sample(scene.sky, p, scene.skySize.x, scene.skySize.x * scene.skySize.y);
+  for (std::size_t i = 0; i != scene.locals.size(); ++i)
+    addLocal(scene, ray, i, s, ds, weight, result.suns[scene.suns.size() + i]);
+  if (!scene.scattered.empty()) {
+    const Vec3i size = scene.scatteredSize;
+    Vec3f p = at(ray.scattered);
+    for (int axis = 0; axis != 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, float(size[axis] - 1) - 1e-3f);
+    std::size_t lattice = 0;
+    for (std::size_t light = 0; light <= scene.lightCount(); ++light)
+      for (int c = 0; c != scene.colours; ++c)
+        if (const float* values = scene.scattered[lattice++])
+          (light < scene.lightCount() ? result.suns[light] : result.sky)[c] +=
+              weight[c] * sample(values, p, size.x, size.x * size.y);
+  }
+  if (scene.glow[0]) {
+    const Vec3i size = scene.scatteredSize;
+    Vec3f p = at(ray.scattered);
+    for (int axis = 0; axis != 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, float(size[axis] - 1) - 1e-3f);
+    for (int c = 0; c != 3; ++c)
+      result.emission[c] += weight[c] * sample(scene.glow[c], p, size.x, size.x * size.y);
   }
   return after > scene.cutoff;
 }

@@ -46,28 +46,12 @@ struct Reader {
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
-// In [-0.5, 0.5), its error high in frequency: hides the steps of 8 bits in smooth skies without visible
-// grain.
-float dither(std::size_t x, std::size_t y) {
-  const double d = 0.7548776662466927 * double(x) + 0.5698402909980532 * double(y);
-  return float(d - std::floor(d)) - 0.5f;
-}
-
-std::vector<std::uint8_t> quantised(const std::vector<float>& screen, std::size_t width) {
-  std::vector<std::uint8_t> bytes(screen.size());
-  for (std::size_t i = 0; i != screen.size(); ++i) {
-    const float value = std::floor(screen[i] * 255.0f + 0.5f + 0.999f * dither(i / 3 % width, i / 3 / width));
-    bytes[i] = std::uint8_t(std::fmin(255.0f, std::fmax(0.0f, value)));
-  }
-  return bytes;
-}
-
 }  // namespace
 
 void writePng(const std::string& path, const Image& image, const ViewTransform& view,
               const std::map<std::string, std::string>& metadata) {
   const auto width = std::size_t(image.width);
-  const std::vector<std::uint8_t> bytes = quantised(displayed(image, view), width);
+  const std::vector<std::uint8_t> bytes = screenBytes(image, view);
   OutputFile output(path);
   try {
     const File file(std::fopen(output.temporaryPath().c_str(), "wb"));

@@ -1,16 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "modeling/progress.h"
-#include "render/camera.h"
+#include "render/camera_motion.h"
+#include "render/deep_image.h"
+#include "render/holdout.h"
 #include "render/image.h"
 #include "render/lights.h"
 #include "render/medium.h"
 #include "render/render_volume.h"
+#include "render/surfaces.h"
 
 namespace nephele {
 
@@ -25,15 +29,33 @@ struct RenderOptions {
   int samples = 4;
   /// Moves the pattern of the samples.
   std::uint64_t seed = 0;
-  /// Extra layers: "Z" (distance along the line of sight at which the opacity passes 0.5 %, the nearest of
-  /// the pixel's rays; +inf where none does), "transmittance" (layer transmittance.R, .G, .B), "light"
-  /// (layers light_<name> for every sun and light_sky: their share of R, G, B).
+  /// When the volume is looked at, if it moves; the camera's own shutter is in Camera::withShutter.
+  Shutter shutter{};
+  /// Of the volume, while the shutter is open. The light in it moves along with it.
+  std::optional<RigidMotion> volumeMotion{};
+  /// The camera one frame later, for motion in pixels where the shutter is open for an instant only.
+  std::optional<Camera> nextCamera{};
+  /// Makes RenderResult::deep as well.
+  std::optional<DeepOptions> deep{};
+  /// Hides what is behind it; for pictures of the camera's size.
+  std::shared_ptr<const Holdout> holdout{};
+  /// Opaque objects, lit by suns, points, spots and the sky through the volume, and casting the suns' shadows
+  /// into it. They stand still, and scatter no light into it. Layer light_objects.
+  std::shared_ptr<const Surfaces> surfaces{};
+  /// Extra layers, see Film: "Z" (distance along the line of sight at which the opacity passes 0.5 %, the
+  /// nearest of the pixel's rays; +inf where none does), "transmittance" (1 - opacity), "albedo" (times
+  /// opacity), "light" (light_<name> for every sun, and light_sky: their share of R, G, B), and what the ray
+  /// through the pixel's centre meets in the middle of the shutter: "Z_median", "Z_mean" (where half of its
+  /// opacity is met, and the mean weighted by opacity; +inf where there is none), "position", "normal"
+  /// (world space, at the median), "motion" (pixels per frame, right and down).
   std::vector<std::string> aovs{"Z"};
 };
 
 /// A picture and what it took.
 struct RenderResult {
   Image image;
+  /// The same with depth, if RenderOptions::deep asks for it: flattened it is `image`.
+  std::optional<DeepImage> deep{};
   std::uint64_t rays = 0;
   std::uint64_t samples = 0;
   double lightSeconds = 0;
@@ -47,14 +69,48 @@ float defaultExtinction(const RenderVolume& volume);
 
 /// Looks at `volume` through `camera`: light precomputed, then marched, front to back, from every pixel.
 ///
-/// C += T (1 - dT) * sum over lights;  a sun gives  irradiance * sum over octaves of phase * exp(-extinction
-/// * column / 2^n) * contribution^n * albedo^(2^n), the sky radiance * albedo * visibility. alpha = 1 - T;
-/// rays end at T < 1e-4, what is left stays in alpha. Channels R, G, B, A (half, premultiplied, linear) and
-/// `aovs` (float). An empty volume gives a picture of zeros. The same at any number of threads.
+/// C += T (1 - dT) * albedo * sum over lights;  a sun gives  irradiance * (phase * exp(-extinction * column)
+/// + light scattered before, see Octaves), the sky radiance * J, see ScatteredLight. alpha = 1 - T; rays end
+/// at T < 1e-4, what is left stays in alpha. Channels R, G, B, A (half, premultiplied, linear) and `aovs`
+/// (float). An empty volume gives a picture of zeros. The same at any number of threads.
 /// @throws Error if an option is outside its range or a layer is unknown.
 RenderResult renderImage(const RenderVolume& volume, const Medium& medium, const Lights& lights,
                          const Camera& camera, const RenderOptions& options = {},
                          const Progress& progress = silent());
+
+namespace detail {
+struct BakedLight;
+}
+
+/// A volume with the light in it, made once, that any number of cameras may look at: renderImage in two
+/// parts. The pictures are the same. Cheap to copy.
+class LitVolume {
+ public:
+  /// Keeps a reference to `volume`. @throws Error if an argument is outside its range.
+  LitVolume(const RenderVolume& volume, const Medium& medium, const Lights& lights, const Octaves& octaves,
+            const Progress& progress = silent());
+
+  /// The same volume under `lights`. What they have in common with the present ones is not made again: the
+  /// sky's part, where only suns differ.
+  LitVolume underOther(const Lights& lights, const Progress& progress = silent()) const;
+
+  /// @throws Error as renderImage does, or if the octaves are not those that the light was made with.
+  /// `lightSeconds` of the result is 0.
+  RenderResult render(const Camera& camera, const RenderOptions& options,
+                      const Progress& progress = silent()) const;
+
+  const Lights& lights() const { return lights_; }
+  /// What it took to make the light.
+  double lightSeconds() const { return lightSeconds_; }
+
+ private:
+  const RenderVolume* volume_;
+  Medium medium_;
+  Lights lights_;
+  Octaves octaves_;
+  std::shared_ptr<const detail::BakedLight> light_;
+  double lightSeconds_ = 0;
+};
 
 /// Bytes that renderImage will hold beside the volume, at most.
 double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, const Camera& camera,

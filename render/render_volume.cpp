@@ -26,7 +26,8 @@ namespace {
 constexpr std::uint8_t kFarthest = 32;
 }  // namespace
 
-RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density) : density_(std::move(density)) {
+RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour)
+    : density_(std::move(density)), colour_(std::move(colour)) {
   require(density_ != nullptr, "render volume: no density given");
   require(!density_->isPacked(), "render volume: the density must not be packed");
   const BrickGrid& grid = *density_;
@@ -40,10 +41,59 @@ RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density) : density_(
   for (const Interval& range : grid.ranges)
     require(std::isfinite(range.min) && std::isfinite(range.max),
             "density: contains values that are not finite");
+  checkColour(colour_.scattering, "colour");
+  checkColour(colour_.emission, "emission");
   findOccupied();
+  measureColour();
   if (isEmpty()) return;
   measureEmptiness();
   measureBounds();
+}
+
+void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* name) const {
+  const auto laidOutAs = [](const BrickGrid& a, const BrickGrid& b) {
+    return a.firstBrick == b.firstBrick && a.brickCount == b.brickCount &&
+           a.worldToIndex.translation == b.worldToIndex.translation &&
+           a.worldToIndex.linear == b.worldToIndex.linear;
+  };
+  for (const auto& grid : grids) {
+    require((grid == nullptr) == (grids[0] == nullptr), fmt::format("{}: three grids or none needed", name));
+    if (!grid) continue;
+    require(!grid->isPacked() && grid->table == grids[0]->table && laidOutAs(*grid, *density_) &&
+                grid->values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+            fmt::format("{}: its bricks must be laid out as the density's", name));
+    for (const Interval& range : grid->ranges)
+      require(std::isfinite(range.min) && std::isfinite(range.max),
+              fmt::format("{}: contains values that are not finite", name));
+  }
+}
+
+// Sums in a fixed order, since the mean must not depend on the threads.
+void RenderVolume::measureColour() {
+  if (!hasColour()) return;
+  double density = 0, colours[3] = {};
+  const auto sumOf = [](const BrickGrid& grid, const Vec3i& brick) {
+    const float* values = grid.brick(grid.poolIndex(brick));
+    double sum = 0;
+    for (int z = 0; z != BrickGrid::kBrick; ++z)
+      for (int y = 0; y != BrickGrid::kBrick; ++y)
+        for (int x = 0; x != BrickGrid::kBrick; ++x)
+          sum += double(std::max(values[sampleOffset(x, y, z)], 0.0f));
+    return sum;
+  };
+  for (const Vec3i& brick : occupied_) {
+    density += sumOf(*density_, brick);
+    for (std::size_t c = 0; c != 3; ++c) colours[c] += sumOf(*colour_.scattering[c], brick);
+  }
+  for (int c = 0; c != 3; ++c)
+    meanColour_[c] = density > 0 ? float(std::min(colours[c] / density, 1.0)) : 1.0f;
+}
+
+bool RenderVolume::isOccupied(std::size_t entry) const {
+  if (density_->ranges[std::size_t(density_->table[entry])].max > 0) return true;
+  for (const auto& grid : colour_.emission)
+    if (grid && grid->ranges[std::size_t(grid->table[entry])].max > 0) return true;
+  return false;
 }
 
 void RenderVolume::findOccupied() {
@@ -53,7 +103,7 @@ void RenderVolume::findOccupied() {
     for (int y = 0; y < grid.brickCount.y; ++y)
       for (int x = 0; x < grid.brickCount.x; ++x, ++entry) {
         const float most = grid.ranges[std::size_t(grid.table[entry])].max;
-        if (!(most > 0)) continue;
+        if (!isOccupied(entry)) continue;
         occupied_.push_back(grid.firstBrick + Vec3i{x, y, z});
         maxDensity_ = std::max(maxDensity_, most);
       }
@@ -116,12 +166,17 @@ void RenderVolume::measureBounds() {
   parallelFor(border.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
       const float* values = grid.brick(grid.poolIndex(border[i]));
+      const float* glows[3] = {};
+      for (std::size_t c = 0; c != 3 && hasEmission(); ++c)
+        glows[c] = colour_.emission[c]->brick(colour_.emission[c]->poolIndex(border[i]));
+      const float* const* glow = hasEmission() ? glows : nullptr;
       Box box;
       for (int z = 0; z <= brickSize; ++z)
         for (int y = 0; y <= brickSize; ++y)
           for (int x = 0; x <= brickSize; ++x) {
             const int at = ((z + 1) * BrickGrid::kWidth + y + 1) * BrickGrid::kWidth + x + 1;
-            if (values[at] > 0) box = box.including(Vec3f(border[i] * brickSize + Vec3i{x, y, z}));
+            if (values[at] > 0 || (glow && (glow[0][at] > 0 || glow[1][at] > 0 || glow[2][at] > 0)))
+              box = box.including(Vec3f(border[i] * brickSize + Vec3i{x, y, z}));
           }
       // Interpolation carries density to the voxel beyond.
       if (!box.isEmpty()) boxes[i] = box.expanded(1.0f);
@@ -136,6 +191,25 @@ void RenderVolume::measureBounds() {
       worldBounds_ = worldBounds_.including(outline_.back());
     }
   }
+}
+
+float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
+  const Vec3f p = density_->worldToIndex(world);
+  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+  const Vec3f f = p - Vec3f(cell);
+  const auto valueOf = [&](const BrickGrid& grid) {
+    const float* at = grid.brick(grid.poolIndex(brickOf(cell))) +
+                      sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
+    float sum = 0;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3i d{corner & 1, corner >> 1 & 1, corner >> 2};
+      sum += (d.x ? f.x : 1 - f.x) * (d.y ? f.y : 1 - f.y) * (d.z ? f.z : 1 - f.z) *
+             std::max(at[(d.z * BrickGrid::kWidth + d.y) * BrickGrid::kWidth + d.x], 0.0f);
+    }
+    return sum;
+  };
+  const float density = valueOf(*density_);
+  return density > 0 && hasEmission() ? valueOf(*colour_.emission[std::size_t(colour)]) / density : 0.0f;
 }
 
 float RenderVolume::typicalDensity() const {
@@ -166,7 +240,10 @@ float RenderVolume::typicalDensity() const {
 }
 
 std::size_t RenderVolume::memoryBytes() const {
-  return density_->memoryBytes() + emptiness_.size() + occupied_.size() * sizeof(Vec3i) +
+  std::size_t colours = 0;
+  for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
+    for (const auto& grid : *grids) colours += grid ? grid->memoryBytes() : 0;
+  return density_->memoryBytes() + colours + emptiness_.size() + occupied_.size() * sizeof(Vec3i) +
          outline_.size() * sizeof(Vec3f);
 }
 

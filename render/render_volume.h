@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,18 +11,38 @@
 
 namespace nephele {
 
+/// What a density may hold beside itself, on bricks laid out as its own: three grids of the same table, or
+/// nulls. Values below zero count as zero.
+struct VolumeColour {
+  using Grids = std::array<std::shared_ptr<const BrickGrid>, 3>;
+
+  /// Density times its colour, which multiplies the albedo and is at most 1: so that colours mix by their
+  /// share where volumes overlap, and no edge is darker because the colour ends there too.
+  Grids scattering{};
+  /// Light of its own, in Rec.709: a Medium glows with extinction * emission per world unit, whatever the
+  /// density there. So much density 1 shows where it is opaque.
+  Grids emission{};
+};
+
 /// A density that is ready to be marched: bricks, which of them hold anything, and how far it is to the next
 /// that does.
 ///
 /// Densities are per world unit and multiply the extinction of a Medium. Values below zero count as zero.
 class RenderVolume {
  public:
-  /// Keeps a reference to `density`. Cost: one pass over the brick table, none over the samples.
-  /// @throws Error if the background is not 0, a value is not finite, or the bricks are too many to index
-  /// (1.6 million distinct ones, 8.5 GB).
-  explicit RenderVolume(std::shared_ptr<const BrickGrid> density);
+  /// Keeps references to the grids. Cost: one pass over the brick tables, with a colour one over its samples.
+  /// @throws Error if a background is not 0, a value is not finite, the bricks are too many to index (1.6
+  /// million distinct ones, 8.5 GB), or colours are laid out in another way.
+  explicit RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour = {});
 
   const BrickGrid& density() const { return *density_; }
+  const VolumeColour& colour() const { return colour_; }
+  bool hasColour() const { return colour_.scattering[0] != nullptr; }
+  bool hasEmission() const { return colour_.emission[0] != nullptr; }
+  /// What the albedo is multiplied by, mean over the density; 1 without a colour.
+  const Vec3f& meanColour() const { return meanColour_; }
+  /// Emission over density at a world-space point; 0 where there is no density. Slow beside a march.
+  float emissionPerDensity(const Vec3f& world, int colour) const;
   /// True where nothing in the volume is above zero.
   bool isEmpty() const { return occupied_.empty(); }
   float maxDensity() const { return maxDensity_; }
@@ -29,7 +50,7 @@ class RenderVolume {
   /// Cost: one pass over the samples.
   float typicalDensity() const;
 
-  /// Brick coordinates of the bricks that hold density, in the table's order.
+  /// Brick coordinates of the bricks that hold density or emission, in the table's order.
   const std::vector<Vec3i>& occupiedBricks() const { return occupied_; }
   /// Distance in bricks (largest of the three axes) from every entry of the brick table to the nearest brick
   /// that holds density: 0 in one, saturating at 32. A ray may leave the box of radius distance - 1 around an
@@ -45,11 +66,16 @@ class RenderVolume {
   std::size_t memoryBytes() const;
 
  private:
+  void checkColour(const VolumeColour::Grids& grids, const char* name) const;
+  void measureColour();
+  bool isOccupied(std::size_t entry) const;
   void findOccupied();
   void measureEmptiness();
   void measureBounds();
 
   std::shared_ptr<const BrickGrid> density_;
+  VolumeColour colour_;
+  Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;
   std::vector<std::uint8_t> emptiness_;
   std::vector<Vec3f> outline_;

@@ -76,27 +76,219 @@ TEST_F(RenderVerb, MakesTheSamePictureAtAnyNumberOfThreads) {
     EXPECT_EQ(one.channels[c].values, all.channels[c].values);
 }
 
+TEST_F(RenderVerb, PathTracesTheSamePicture) {
+  const TemporaryFolder folder;
+  const std::string start = "render " + fog() +
+                            " --size 24x18 --quiet --sky 0,0,0 --extinction 2 --albedo 0.9,0.8,0.7 --phase "
+                            "hg:0.3 --aov Z,light -o ";
+  const std::string path = " --integrator path --spp 200";
+  ASSERT_EQ(runProgram(start + folder.file("march.exr")).exitCode, 0);
+  ASSERT_EQ(runProgram(start + folder.file("path.exr") + path + " --stats " + folder.file("s.json")).exitCode,
+            0);
+  ASSERT_EQ(runProgram(start + folder.file("once.exr") + path + " --scatterings 1").exitCode, 0);
+  ASSERT_EQ(runProgram(start + folder.file("march_once.exr") + " --octaves 1").exitCode, 0);
+  const auto sum = [&](const std::string& file, const std::string& channel) {
+    const Image image = readImage(folder.file(file));
+    double total = 0;
+    for (const float value : image.channel(channel).values)
+      if (std::isfinite(value)) total += double(value);
+    return total;
+  };
+  // 200 paths of some 200 covered pixels leave less than 1 % of noise.
+  for (const char* channel : {"R", "B"}) {
+    EXPECT_NEAR(sum("march.exr", channel) / sum("path.exr", channel), 1, 0.08);
+    EXPECT_NEAR(sum("march_once.exr", channel) / sum("once.exr", channel), 1, 0.03);
+  }
+  EXPECT_EQ(sum("path.exr", "Z"), sum("march.exr", "Z"));
+  EXPECT_GT(sum("path.exr", "R"), 1.2 * sum("once.exr", "R"));
+  EXPECT_EQ(nlohmann::json::parse(textOf(folder.file("s.json")))["rays"], 24 * 18 * 200);
+}
+
 TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
   const TemporaryFolder folder;
   const std::string start = "render " + fog() + " -o " + folder.file("a.exr") + " ";
   const struct {
     const char *arguments, *option;
-  } cases[] = {{"--size 64", "--size"},          {"--size 0x10", "--size"},
-               {"--size 10x10x10", "--size"},    {"--view 30", "--view"},
-               {"--view a,b", "--view"},         {"--sun 10", "--sun"},
-               {"--sun 1,2,-3", "--sun"},        {"--sky 1,2", "--sky"},
-               {"--sky -1,0,0", "--sky"},        {"--albedo 1,1,2", "--albedo"},
-               {"--phase mie:5", "--phase"},     {"--phase hg:2", "--phase"},
-               {"--octaves 0", "--octaves"},     {"--samples 0", "--samples"},
-               {"--step 0", "--step"},           {"--step -1", "--step"},
-               {"--fov 200", "--fov"},           {"--extinction -1", "--extinction"},
-               {"--aov depth", "--aov"},         {"--integrator path", "--integrator"},
-               {"--point 1,2,3,4", "--point"},   {"--look-at 0,0,0", "--look-at"},
-               {"--preview a.jpg", "--preview"}, {"--exposure x", "--exposure"}};
+  } cases[] = {{"--size 64", "--size"},
+               {"--size 0x10", "--size"},
+               {"--size 10x10x10", "--size"},
+               {"--view 30", "--view"},
+               {"--view a,b", "--view"},
+               {"--sun 10", "--sun"},
+               {"--sun 1,2,-3", "--sun"},
+               {"--sky 1,2", "--sky"},
+               {"--sky -1,0,0", "--sky"},
+               {"--albedo 1,1,2", "--albedo"},
+               {"--phase mie:51", "--phase"},
+               {"--phase hg:2", "--phase"},
+               {"--octaves 0", "--octaves"},
+               {"--samples 0", "--samples"},
+               {"--step 0", "--step"},
+               {"--step -1", "--step"},
+               {"--fov 200", "--fov"},
+               {"--extinction -1", "--extinction"},
+               {"--aov depth", "--aov"},
+               {"--integrator bdpt", "--integrator"},
+               {"--spp 0", "--spp"},
+               {"--scatterings -1", "--scatterings"},
+               {"--phase schlick:1", "--phase"},
+               {"--phase two-lobe:0.5,0.5", "--phase"},
+               {"--point 1,2,3,-4", "--point"},
+               {"--look-at 0,0,0", "--look-at"},
+               {"--preview a.jpg", "--preview"},
+               {"--exposure x", "--exposure"}};
   for (const auto& c : cases) {
     const ProgramResult result = runProgram(start + c.arguments);
     EXPECT_EQ(result.exitCode, 2) << c.arguments << ": " << result.errors;
     EXPECT_NE(result.errors.find(c.option), std::string::npos) << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST_F(RenderVerb, MakesAPartOfThePictureThatACompositorPlaces) {
+  const TemporaryFolder folder;
+  const std::string start = "render " + fog() + " --size 40x30 --quiet -o ";
+  ASSERT_EQ(runProgram(start + folder.file("whole.exr")).exitCode, 0);
+  ASSERT_EQ(runProgram(start + folder.file("part.exr") + " --crop 10,5,31,25").exitCode, 0);
+  const Image whole = readImage(folder.file("whole.exr")), part = readImage(folder.file("part.exr"));
+  EXPECT_EQ(part.display, (Image::Display{10, 5, 40, 30}));
+  ASSERT_EQ(part.width, 21);
+  ASSERT_EQ(part.height, 20);
+  for (int y = 0; y != 20; ++y)
+    for (int x = 0; x != 21; ++x) ASSERT_EQ(part.at("R", x, y), whole.at("R", x + 10, y + 5));
+}
+
+// Area of a picture that is covered, and the width of its middle row that is covered somewhat but not quite.
+std::pair<double, int> coverage(const Image& image) {
+  std::pair<double, int> result{};
+  for (int y = 0; y != image.height; ++y)
+    for (int x = 0; x != image.width; ++x) {
+      const float alpha = image.at("A", x, y);
+      result.first += alpha;
+      result.second += y == image.height / 2 && alpha > 0.02f && alpha < 0.98f;
+    }
+  return result;
+}
+
+TEST_F(RenderVerb, LooksThroughLenses) {
+  const TemporaryFolder folder;
+  const std::string start = "render " + fog() + " --size 60x60 --quiet -o " + folder.file("a.exr");
+  // The sum of alpha over parallel rays through a thin ball: the integral of 1 - exp(-2 k sqrt(1 - b^2)) over
+  // the disc is pi - 2 pi (1 - (1 + 2 k) exp(-2 k)) / (2 k)^2, here with k = 0.1.
+  const double disc = kPi - 2 * kPi * (1 - 1.2 * std::exp(-0.2)) / 0.04;
+  const auto covered = [&](const std::string& options) {
+    EXPECT_EQ(runProgram(start + " --extinction 0.1 " + options).exitCode, 0);
+    return coverage(readImage(folder.file("a.exr"))).first / 3600;
+  };
+  // An orthographic picture 4 wide; one that shows all of the ball and a voxel around it on 92 % of its
+  // width.
+  EXPECT_NEAR(covered("--projection orthographic --orthographic-width 4"), disc / 16, 0.02 * disc / 16);
+  const double shown = disc / 4 * 0.92 * 0.92;
+  for (const char* place : {"--view 0,0", "--camera-position 9,0,0 --up 0,0,1"})
+    EXPECT_NEAR(covered(std::string("--projection orthographic ") + place), shown / 1.21, 0.03 * shown);
+  // 36 mm of film behind 18 mm are 90 degrees: at distance 10 the picture is 20 wide.
+  EXPECT_NEAR(covered("--camera-position 0,0,10 --focal-length 18"), disc / 400, 0.03 * disc / 400);
+
+  // A lens of radius 0.5 focused on the ball, and at half its distance: then its edge is blurred over
+  // 2 * 0.5 |1 - 10 / 5| world units on either side, of 7.28 / 60 pixels.
+  const std::string near = " --extinction 50 --camera-position 0,0,10 --fov 40 --samples 64 ";
+  ASSERT_EQ(runProgram(start + near + "--lens-radius 0.5").exitCode, 0);
+  const auto sharp = coverage(readImage(folder.file("a.exr")));
+  ASSERT_EQ(runProgram(start + near + "--lens-radius 0.5 --focus-distance 5").exitCode, 0);
+  const auto blurred = coverage(readImage(folder.file("a.exr")));
+  EXPECT_NEAR(blurred.second, 16, 4);
+  EXPECT_LT(sharp.second, 7);
+  EXPECT_NEAR(blurred.first / sharp.first, 1, 0.05);
+  // The same lens by its f-stop, focal length / diameter, the diameter being 1.
+  const double focalLength = 0.036 / (2 * std::tan(20 * double(kPi) / 180));
+  ASSERT_EQ(runProgram(start + near + "--focus-distance 5 --f-stop " + std::to_string(focalLength)).exitCode,
+            0);
+  EXPECT_NEAR(coverage(readImage(folder.file("a.exr"))).first, blurred.first, 0.5);
+}
+
+TEST_F(RenderVerb, FollowsAnimatedCamerasAndBlursWhatMoves) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("a.chan")) << "1 0 0 10 0 0 0 40\n2 2 0 10 0 0 0 40\n3 4 0 10 0 0 0 40\n";
+  std::ofstream(folder.file("a.json"))
+      << R"({"frames": [{"frame": 1, "position": [0, 0, 10], "rotation": [0, 0, 0]},
+    {"frame": 3, "position": [4, 0, 10], "rotation": [0, 0, 0]}]})";
+  const std::string start = "render " + fog() + " --size 60x60 --extinction 50 --samples 32 --quiet -o " +
+                            folder.file("a.exr") + " ";
+  const auto middle = [&] {
+    const Image image = readImage(folder.file("a.exr"));
+    double sum = 0, moment = 0;
+    for (int x = 0; x != 60; ++x) {
+      sum += image.at("A", x, 30);
+      moment += image.at("A", x, 30) * (x + 0.5);
+    }
+    return moment / sum;
+  };
+  // 7.28 units across at distance 10: 8.24 pixels per unit. At frame 2 the camera is 2 to the right.
+  ASSERT_EQ(runProgram(start + "--camera " + folder.file("a.chan")).exitCode, 0);
+  EXPECT_NEAR(middle(), 30, 0.2);
+  const auto still = coverage(readImage(folder.file("a.exr")));
+  for (const char* file : {"a.chan", "a.json"}) {
+    ASSERT_EQ(runProgram(start + "--fov 40 --frame 2 --camera " + folder.file(file)).exitCode, 0);
+    EXPECT_NEAR(middle(), 30 - 2 * 8.24, 0.3) << file;
+  }
+  // The shutter is open for half a frame, in which the camera goes one unit to the right; a volume that goes
+  // to the left looks the same.
+  ASSERT_EQ(runProgram(start + "--shutter 0,0.5 --camera " + folder.file("a.chan")).exitCode, 0);
+  const auto moved = coverage(readImage(folder.file("a.exr")));
+  EXPECT_NEAR(middle(), 30 - 0.5 * 8.24, 0.3);
+  // Both edges are ramps as wide as the way, and the filter of a pixel.
+  EXPECT_LT(still.second, 7);
+  EXPECT_NEAR(moved.second, 2 * 8.24, 3);
+  ASSERT_EQ(
+      runProgram(start + "--camera-position 0,0,10 --fov 40 --shutter 0,0.5 --volume-motion -2,0,0").exitCode,
+      0);
+  EXPECT_NEAR(middle(), 30 - 0.5 * 8.24, 0.3);
+  EXPECT_NEAR(coverage(readImage(folder.file("a.exr"))).first, moved.first, 1);
+}
+
+TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
+  const TemporaryFolder folder, files;
+  std::ofstream(files.file("a.chan")) << "1 0 0 10 0 0 0 40\n5 2 0 10 0 0 0 40\n";
+  std::ofstream(files.file("bad.chan")) << "1 0 0 10 0 0 0 40\n2 zero 0 10 0 0 0 40\n";
+  std::ofstream(files.file("bad.json")) << "{\n\"frames\": 3}";
+  const std::string start = "render " + fog() + " -o " + folder.file("a.exr") + " --size 8x6 ";
+  const std::string chan = "--camera " + files.file("a.chan") + " ";
+  const struct {
+    std::string arguments;
+    int exitCode;
+    std::string message;
+  } cases[] = {{"--crop 1,2,3", 2, "--crop"},
+               {"--crop 3,0,3,5", 2, "--crop"},
+               {"--crop 0,0,4.5,5", 2, "--crop"},
+               {"--crop 0,0,9,5", 2, "0,0,8,6"},
+               {"--projection fisheye", 2, "--projection"},
+               {"--orthographic-width 0", 2, "--orthographic-width"},
+               {"--focal-length 50 --fov 30", 2, "--fov"},
+               {"--focal-length 0", 2, "--focal-length"},
+               {"--film-width -3", 2, "--film-width"},
+               {"--f-stop 0", 2, "--f-stop"},
+               {"--f-stop 2 --lens-radius 1", 2, "--f-stop"},
+               {"--f-stop 2 --projection orthographic", 2, "--lens-radius"},
+               {"--lens-radius 1 --camera-position 0,0,9 --look-at 0,0,20", 2, "--focus-distance"},
+               {"--focus-distance 0", 2, "--focus-distance"},
+               {"--shutter 0.5", 2, "--shutter"},
+               {"--shutter 0.5,0", 2, "--shutter"},
+               {"--shutter 0,0.5", 2, "--shutter"},
+               {"--volume-motion 1,2", 2, "--volume-motion"},
+               {"--volume-motion 1,2,3", 2, "--shutter"},
+               {"--frame 3", 2, "--frame"},
+               {chan + "--frame 6", 2, "1 to 5"},
+               {chan + "--frame x", 2, "--frame"},
+               {chan + "--view 1,2", 2, "--view"},
+               {chan + "--rotation-order XYX", 2, "--rotation-order"},
+               {"--camera " + files.file("bad.chan"), 1, "bad.chan:2: 'zero' is not a number"},
+               {"--camera " + files.file("bad.json"), 1, "bad.json:2: "},
+               {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be read"},
+               {"--camera " + fog(), 1, ".chan, .json"}};
+  for (const auto& c : cases) {
+    const ProgramResult result = runProgram(start + c.arguments);
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
   }
   EXPECT_EQ(folder.entryCount(), 0u);
 }

@@ -36,7 +36,8 @@ struct Rays {
     scene.ranges = grid->ranges.data();
     scene.emptiness = volume.emptiness().data();
     scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
-    scene.octaves = 8;
+    scene.octaves = 3;
+    scene.attenuation[1] = 0.9f, scene.attenuation[2] = 0.7f;
     scene.extinction = extinction;
     scene.step = scene.uniformStep = grid->voxelSize;
     scene.leastStep = grid->voxelSize / 8;
@@ -50,7 +51,7 @@ struct Rays {
       ray.density = in(grid->worldToIndex, grid->firstBrick);
       ray.suns[0] = in(light.worldToLattice(), light.firstBrick());
       ray.length = 2;
-      for (int n = 0; n != 8; ++n) ray.weight[0][0][n] = 0.1f;
+      for (int n = 0; n != 3; ++n) ray.weight[0][0][n] = 0.1f;
     }
     results.resize(rays.size());
   }

@@ -121,5 +121,33 @@ TEST(PngIo, WritesWhatTheScreenShows) {
   EXPECT_EQ(folder.entryCount(), 1u);
 }
 
+TEST(ExrIo, KeepsWhereAPartOfAPictureBelongs) {
+  const test::TemporaryFolder folder;
+  Image part;
+  part.setWindow({5, 7, 8, 9}, 20, 10);
+  ASSERT_EQ(part.width, 3);
+  ASSERT_EQ(part.height, 2);
+  for (const bool half : {true, false}) {
+    auto& values = part.add(half ? "A" : "Z", half).values;
+    for (std::size_t i = 0; i != values.size(); ++i) values[i] = float(i);
+  }
+  const Camera camera = Camera::lookingAt({0, 0, 1}, {0, 0, 0}, {0, 1, 0}, {20, 10, 90.0f});
+  writeExr(folder.file("a.exr"), part, camera);
+  const Image back = readImage(folder.file("a.exr"));
+  EXPECT_EQ(back.display, (Image::Display{5, 7, 20, 10}));
+  for (const char* name : {"A", "Z"}) EXPECT_EQ(back.channel(name).values, part.channel(name).values);
+  bool data = false, display = false, width = false;
+  for (const std::string& line : describeImage(folder.file("a.exr"))) {
+    data = data || line == "dataWindow: 3 x 2 at 5,7";
+    display = display || line == "displayWindow: 20 x 10 at 0,0";
+    width = width || line == "screenWindowWidth: 2";  // 2 tan(45 degrees)
+  }
+  EXPECT_TRUE(data && display && width);
+
+  Image whole;
+  whole.setWindow({0, 0, 20, 10}, 20, 10);
+  EXPECT_FALSE(whole.display);
+}
+
 }  // namespace
 }  // namespace nephele

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "modeling/error.h"
-#include "render/ambient_volume.h"
 #include "render/lights.h"
 #include "tests/support/density.h"
 
@@ -138,53 +137,6 @@ TEST(LightVolume, StaysWithinItsEstimate) {
   const RenderVolume volume(ball(1.0f, 0.05f));
   for (const Vec3f& towards : {Vec3f{0, 1, 0}, Vec3f{1, 1, 1}, Vec3f{-1, 0.5f, 0.9f}})
     EXPECT_LE(double(LightVolume(volume, towards).memoryBytes()), LightVolume::estimateBytes(volume));
-}
-
-TEST(AmbientVolume, SeesTheWholeSkyThroughThinAir) {
-  const RenderVolume volume(ball(1.0f, 0.1f));
-  Medium medium;
-  medium.extinction = 1e-4f;
-  medium.albedo = {1, 1, 1};
-  EXPECT_NEAR(AmbientVolume(volume, medium, {1, 1, 1}).visibility({0, 0, 0}), 1.0f, 1e-3f);
-}
-
-TEST(AmbientVolume, SeesWhatABallLetsThrough) {
-  // In the middle of a ball every direction passes radius * density: exp(-1.2).
-  const RenderVolume volume(ball(1.0f, 0.05f));
-  Medium medium;
-  medium.extinction = 1.2f;
-  medium.albedo = {1, 1, 1};
-  const AmbientVolume ambient(volume, medium, {1, 1, 1});
-  EXPECT_NEAR(ambient.visibility({0, 0, 0}), std::exp(-1.2f), 0.01f);
-  // Nearer to the surface it is brighter, on all sides alike.
-  const float up = ambient.visibility({0, 0.8f, 0});
-  EXPECT_GT(up, ambient.visibility({0, 0, 0}) + 0.1f);
-  for (const Vec3f& p : {Vec3f{0.8f, 0, 0}, Vec3f{0, -0.8f, 0}, Vec3f{0, 0, -0.8f}, Vec3f{0.57f, 0.57f, 0}})
-    EXPECT_NEAR(ambient.visibility(p), up, 0.02f);
-}
-
-TEST(AmbientVolume, ThinsOctavesThatItsNodesCannotResolve) {
-  // One octave, an optical depth of 60 between nodes: still a smooth occlusion, dark inside and bright
-  // outside.
-  const RenderVolume volume(ball(1.0f, 0.1f));
-  Medium medium;
-  medium.extinction = 600;
-  const AmbientVolume ambient(volume, medium, {1, 1, 1});
-  // Halved until a node's is below 0.75: 0.47, ten nodes deep.
-  EXPECT_NEAR(ambient.visibility({0, 0, 0}), std::exp(-4.7f), 0.003f);
-  EXPECT_GT(ambient.visibility({0, 1.4f, 0}), 0.5f);
-}
-
-TEST(AmbientVolume, NeverExceedsTheSky) {
-  const RenderVolume volume(ball(1.0f, 0.1f));
-  Medium medium;
-  medium.extinction = 30;
-  medium.albedo = {1, 1, 1};
-  const AmbientVolume ambient(volume, medium, {});
-  for (const float value : ambient.values()) {
-    ASSERT_GE(value, 0.0f);
-    ASSERT_LE(value, 1.0f);
-  }
 }
 
 }  // namespace

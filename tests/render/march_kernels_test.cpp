@@ -32,9 +32,11 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   scene.ranges = grid->ranges.data();
   scene.emptiness = volume.emptiness().data();
   scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
-  scene.sky = sky.data();
-  scene.skySize = {5, 4, 3};
+  // Three colours of the sun, of which green has none, and of the sky.
+  scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
+  scene.scatteredSize = {5, 4, 2};
   scene.octaves = 5;
+  for (int n = 0; n != 5; ++n) scene.attenuation[n] = 1.0f / float(1 + n);
   scene.colours = 3;
   scene.step = 0.1f;
   scene.leastStep = 0.0125f;
@@ -47,7 +49,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
     MarchRay ray;
     ray.density = through(grid->worldToIndex, grid->firstBrick, origin, direction);
     ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, direction);
-    ray.sky = through(toSky, {}, origin, direction);
+    ray.scattered = through(toSky, {}, origin, direction);
     ray.length = 2.5f;
     ray.jitter = 0.3f;
     for (int c = 0; c != 3; ++c)
@@ -65,7 +67,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
         // The vectors notice only every 16 samples that nothing is left to see.
         const float seen = std::exp(-expected[i].opticalDepth);
         ASSERT_NEAR(std::exp(-results[i].opticalDepth), seen, 1.1e-4f);
-        ASSERT_NEAR(results[i].sky, expected[i].sky, 2e-4f);
+        for (int c = 0; c != 3; ++c) ASSERT_NEAR(results[i].sky[c], expected[i].sky[c], 2e-4f);
         ASSERT_EQ(std::isinf(results[i].distance), std::isinf(expected[i].distance));
         if (std::isfinite(results[i].distance)) {
           ASSERT_NEAR(results[i].distance, expected[i].distance, 1e-4f);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "modeling/error.h"
+#include "render/path_trace.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
 
@@ -146,27 +147,74 @@ TEST(Raymarch, AddsSunsAndColoursTheirLight) {
   EXPECT_NEAR(red(both, "B") / red(both, "R"), 0.25f, 1e-5f);
 }
 
-TEST(Raymarch, OctavesBrightenAHalfSpaceTowardsTheExactSolution) {
-  // Isotropic half space, light and view head on. An octave gives E / (4 pi) weight / (1 + 2^-n), single
-  // scattering being the first; the exact radiance is E / (4 pi) albedo / 2 H(1)^2, H(1) from Chandrasekhar's
-  // table XI.
+TEST(Raymarch, ScattersInAHalfSpaceNearlyAsTheExactSolution) {
+  // Isotropic half space, light and view head on: E / (4 pi) albedo / 2 H(1)^2, H(1) from Chandrasekhar's
+  // table XI; single scattering is the same without H. The slab lets exp(-14) through.
   const RenderVolume volume(slab(6.3f, 20.0f, 0.3f));
   const struct { float albedo, h; } cases[] = {{0.5f, 1.2586f}, {0.9f, 1.8501f}};
   for (const auto& c : cases) {
     RenderOptions options = single();
     options.octaves = {};
-    const Image image =
-        renderImage(volume, medium(1.5f, c.albedo), sun({0, 0, 1}), needle({0, 0, 90}, {0, 0, 0}), options)
-            .image;
-    float octaves = 0;
-    for (int n = 0; n != options.octaves.count; ++n)
-      octaves += std::pow(options.octaves.contribution, float(n)) * std::pow(c.albedo, std::ldexp(1.0f, n)) /
-                 (1 + std::ldexp(1.0f, -n)) / kFourPi;
-    const float exact = c.albedo / 2 * c.h * c.h / kFourPi, once = c.albedo / 2 / kFourPi;
-    EXPECT_NEAR(image.at("R", 0, 0) / octaves, 1, 0.02);
-    EXPECT_LT(octaves, exact);
-    EXPECT_LT(exact - octaves, 0.5f * (exact - once));
+    const Image image = renderImage(volume, medium(2.2f, c.albedo), sun({0, 0, 1}, kFourPi),
+                                    needle({0, 0, 90}, {0, 0, 0}), options)
+                            .image;
+    EXPECT_NEAR(image.at("R", 0, 0) / (c.albedo / 2 * c.h * c.h), 1, 0.06) << c.albedo;
   }
+}
+
+TEST(Raymarch, ScattersAsPathsDo) {
+  // A small cloud in sun and sky: mean within 5 %, and regions of 8 x 8 pixels within 15 %, of the path
+  // tracer, whose noise there is below 2 %.
+  const auto grid = densityGrid(voxels(0.0625f), {-24, -24, -24}, {24, 24, 24}, [](const Vec3f& p) {
+    const float bumps = 0.3f * std::sin(5 * p.x) * std::sin(4 * p.y) * std::sin(6 * p.z);
+    return std::fmin(std::fmax((1 + bumps - length(p)) / 0.3f, 0.0f), 1.0f);
+  });
+  const RenderVolume volume(grid);
+  const Camera camera = Camera::framing(volume.outline(), 25, 15, {32, 24, 35});
+  Medium cloud = medium(12.0f, 0.98f);
+  cloud.phase = Phase::henyeyGreenstein(0.3f);
+  PathOptions paths;
+  paths.samplesPerPixel = 100;
+  paths.aovs = {};
+  for (const Vec3f& towards : {Vec3f{1, 0.7f, 0.4f}, Vec3f{-0.5f, 0.5f, -1}}) {
+    Lights lights = sun(towards, 6);
+    lights.sky = {0.2f, 0.2f, 0.2f};
+    const Image marched = renderImage(volume, cloud, lights, camera).image;
+    const Image traced = pathTraceImage(volume, cloud, lights, camera, paths).image;
+    double sumMarched = 0, sumTraced = 0;
+    for (int by = 0; by != 3; ++by)
+      for (int bx = 0; bx != 4; ++bx) {
+        double a = 0, b = 0, alpha = 0;
+        for (int y = 8 * by; y != 8 * by + 8; ++y)
+          for (int x = 8 * bx; x != 8 * bx + 8; ++x) {
+            a += double(marched.at("R", x, y));
+            b += double(traced.at("R", x, y));
+            alpha += double(marched.at("A", x, y));
+          }
+        sumMarched += a;
+        sumTraced += b;
+        if (alpha > 20) {
+          EXPECT_NEAR(a / b, 1, 0.15) << bx << " " << by;
+        }
+      }
+    EXPECT_NEAR(sumMarched / sumTraced, 1, 0.05);
+  }
+}
+
+TEST(Raymarch, FurnaceIsAsBrightAsItsSky) {
+  // Nothing absorbs and light is the same everywhere: radiance = alpha * sky.
+  const RenderVolume volume(ball(1.0f, 0.1f));
+  for (const char* phase : {"isotropic", "hg:0.8"})
+    for (const float extinction : {1.0f, 50.0f, 1000.0f}) {
+      Medium white = medium(extinction);
+      white.phase = Phase::parse(phase);
+      const Image image = renderImage(volume, white, {{}, {0.5f, 0.5f, 0.5f}},
+                                      Camera::framing(volume.outline(), 10, 20, {16, 12, 35}))
+                              .image;
+      for (int y = 0; y != image.height; ++y)
+        for (int x = 0; x != image.width; ++x)
+          ASSERT_NEAR(image.at("G", x, y), 0.5f * image.at("A", x, y), 2e-4f) << phase << " " << extinction;
+    }
 }
 
 TEST(Raymarch, ConvergesWithTheSquareOfTheStep) {

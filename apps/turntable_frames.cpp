@@ -1,0 +1,176 @@
+// Frames, movie and contact sheet of the verb turntable.
+//
+// The light is made once where it does not move as the volume sees it, and the sky's part of it once in any
+// case. The movie and the sheet are made of the files in the end, so that they are the same whether frames
+// were made now or by an earlier call.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+
+#include "apps/turntable_plan.h"
+#include "modeling/error.h"
+#include "render/contact_sheet.h"
+#include "render/exr_io.h"
+#include "render/png_io.h"
+
+namespace nephele::apps {
+namespace {
+
+// Poses of a camera that turns while its shutter is open.
+constexpr int kPoses = 5;
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The part that one frame has in the progress of all.
+class FrameProgress : public Progress {
+ public:
+  FrameProgress(const Progress& whole, std::size_t done, std::size_t count)
+      : whole_(whole), done_(done), count_(count) {}
+
+  // Light takes a small part of a frame, where it is made for each at all.
+  void begin(std::string_view stage) const override { isPicture_ = stage == "march" || stage == "trace"; }
+  void advance(double fraction) const override {
+    if (isPicture_) whole_.advance((double(done_) + fraction) / double(count_));
+  }
+  void note(std::string_view message) const override { whole_.note(message); }
+  bool cancelled() const override { return whole_.cancelled(); }
+
+ private:
+  const Progress& whole_;
+  std::size_t done_, count_;
+  mutable std::atomic<bool> isPicture_{false};
+};
+
+// Makes one frame after another of a volume.
+class FrameMaker {
+ public:
+  FrameMaker(const PictureOptions& picture, const RenderVolume& volume, const Turntable& turntable,
+             const Camera& start, const Progress& progress)
+      : picture_(picture), volume_(volume), turntable_(turntable), start_(start) {
+    if (!picture.pathTraced && !turntable.lightsMove())
+      light_.emplace(volume, picture.medium, picture.lights, picture.render.octaves, progress);
+    lightSeconds_ = light_ ? light_->lightSeconds() : 0;
+  }
+
+  Camera camera(int frame) const {
+    const Camera camera = turntable_.camera(start_, frame);
+    const Shutter& shutter = picture_.shutter;
+    if (shutter.isInstant() || start_.isMoving() || !turntable_.cameraMoves()) return camera;
+    std::vector<Camera> poses;
+    for (int i = 0; i != kPoses; ++i)
+      poses.push_back(turntable_.camera(
+          start_, frame + shutter.open + (shutter.close - shutter.open) * i / (kPoses - 1)));
+    return camera.withShutter(poses);
+  }
+
+  RenderResult make(int frame, const Camera& camera, const Progress& progress) {
+    if (picture_.pathTraced) {
+      PictureOptions picture = picture_;
+      picture.lights = turntable_.lights(picture_.lights, frame);
+      return picture.picture(volume_, camera, progress);
+    }
+    if (turntable_.lightsMove()) {
+      const Lights lights = turntable_.lights(picture_.lights, frame);
+      light_ = light_ ? light_->underOther(lights, progress)
+                      : LitVolume(volume_, picture_.medium, lights, picture_.render.octaves, progress);
+      lightSeconds_ += light_->lightSeconds();
+    }
+    return light_->render(camera, picture_.marched(camera), progress);
+  }
+
+  double lightSeconds() const { return lightSeconds_; }
+
+ private:
+  const PictureOptions& picture_;
+  const RenderVolume& volume_;
+  const Turntable& turntable_;
+  const Camera& start_;
+  std::optional<LitVolume> light_;
+  double lightSeconds_ = 0;
+};
+
+std::map<std::string, std::string> metadataOf(const PictureOptions& picture, const Run& run, int frame) {
+  auto metadata = run.metadata();
+  metadata["seed"] = std::to_string(picture.render.seed);
+  metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
+  metadata["frame"] = std::to_string(frame);
+  return metadata;
+}
+
+}  // namespace
+
+void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
+                const RenderVolume& volume, const Camera& start, Run& run) {
+  const Vec3f middle = volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
+  const Turntable turntable(options.orbit, middle, plan.first, plan.last, options.turns);
+  std::vector<TurntableFrame*> missing;
+  for (TurntableFrame& frame : plan.frames) {
+    if (frame.skipped && !frame.preview.empty() && !frame.previewSkipped)
+      writePng(frame.preview, readImage(frame.path), picture.screen, metadataOf(picture, run, frame.number));
+    if (!frame.skipped) missing.push_back(&frame);
+  }
+  double marchSeconds = 0;
+  std::uint64_t rays = 0, samples = 0;
+  std::optional<FrameMaker> maker;
+  if (!missing.empty()) maker.emplace(picture, volume, turntable, start, run);
+  run.expect(0.05, options.movie.empty() && options.contactSheet.empty() ? 1.0 : 0.95);
+  run.begin("frames");
+  for (std::size_t i = 0; i != missing.size(); ++i) try {
+      TurntableFrame& frame = *missing[i];
+      const auto began = std::chrono::steady_clock::now();
+      const FrameProgress progress(run, i, missing.size());
+      const Camera camera = maker->camera(frame.number);
+      const RenderResult result = maker->make(frame.number, camera, progress);
+      // Also where a frame has no work that would ask.
+      run.check();
+      const auto metadata = metadataOf(picture, run, frame.number);
+      writeExr(frame.path, result.image, camera, metadata);
+      if (!frame.preview.empty()) writePng(frame.preview, result.image, picture.screen, metadata);
+      frame.seconds = secondsSince(began);
+      marchSeconds += result.marchSeconds;
+      rays += result.rays;
+      samples += result.samples;
+      run.advance(double(i + 1) / double(missing.size()));
+    } catch (const Cancelled&) {
+      run.note(fmt::format("stopped after {} of {} frames; the same call with --skip-existing makes the rest",
+                           i, missing.size()));
+      throw;
+    }
+  run.count("frames", double(missing.size()));
+  run.stats["rays"] = rays;
+  run.stats["samples"] = samples;
+  run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;
+  run.stats["march_seconds"] = marchSeconds;
+}
+
+void makeMovieAndSheet(const TurntablePlan& plan, const TurntableOptions& options,
+                       const PictureOptions& picture, Run& run) {
+  if (options.movie.empty() && options.contactSheet.empty()) return;
+  run.expect(0.95, 1.0);
+  run.begin("movie");
+  std::optional<MovieWriter> movie;
+  std::optional<ContactSheet> sheet;
+  int place = 0;
+  const int count = int(plan.frames.size());
+  for (int i = 0; i != count; ++i) {
+    run.check();
+    const Image image = readImage(plan.frames[std::size_t(i)].path);
+    if (!options.movie.empty()) {
+      if (!movie) movie.emplace(options.movie, image.width, image.height, options.movieOptions);
+      movie->add(image, picture.screen);
+    }
+    if (!options.contactSheet.empty()) {
+      if (!sheet) sheet.emplace(count, image.width, image.height);
+      if (place < int(sheet->shown().size()) && sheet->shown()[std::size_t(place)] == i)
+        sheet->set(place++, image);
+    }
+    run.advance((i + 1.0) / count);
+  }
+  if (movie) movie->finish();
+  if (sheet) writePng(options.contactSheet, sheet->image(), picture.screen, run.metadata());
+}
+
+}  // namespace nephele::apps

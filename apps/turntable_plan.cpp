@@ -1,0 +1,120 @@
+// What a call of the verb turntable has to make, and what of it is there already.
+#include "apps/turntable_plan.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
+
+#include "levelset/output_file.h"
+#include "modeling/error.h"
+#include "modeling/parallel.h"
+#include "render/exr_io.h"
+
+namespace nephele::apps {
+namespace {
+
+// Calls `parse`; its Error becomes a usage error of `option`.
+template <class Parse>
+auto parsed(const std::string& option, const Parse& parse) {
+  try {
+    return parse();
+  } catch (const Error& error) {
+    throw CLI::ValidationError(option, error.what());
+  }
+}
+
+std::vector<int> shardOf(const FrameRange& range, const std::string& text) {
+  int index = 0, count = 0;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, index);
+  const bool slash = first.ec == std::errc() && first.ptr != end && *first.ptr == '/';
+  const auto second = std::from_chars(slash ? first.ptr + 1 : end, end, count);
+  if (!slash || second.ec != std::errc() || second.ptr != end || index < 1 || count < index)
+    refuseValue("--shard", text, "I/N, machine I of N, with 1 <= I <= N");
+  return range.shard(index, count);
+}
+
+// Why `path` is not a whole picture of the `window` of `camera`; "" if it is.
+std::string defect(const std::string& path, const PixelBox& window) {
+  try {
+    const Image image = readImage(path);
+    for (const char* name : {"R", "G", "B"})
+      if (!image.find(name)) return fmt::format("has no channel {}", name);
+    if (image.width != window.width() || image.height != window.height())
+      return fmt::format("is {}x{} and not {}x{}", image.width, image.height, window.width(),
+                         window.height());
+    return {};
+  } catch (const Error& error) {
+    return fmt::format("is not whole ({})", error.what());
+  }
+}
+
+}  // namespace
+
+TurntablePlan::TurntablePlan(const TurntableOptions& options) {
+  const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
+  first = range.first();
+  last = range.last();
+  const FramePattern output = parsed("--output", [&] { return FramePattern::parse(options.output); });
+  std::optional<FramePattern> preview;
+  if (!options.preview.empty())
+    preview = parsed("--preview", [&] { return FramePattern::parse(options.preview); });
+  for (const auto& [name, path] :
+       {std::pair{"--movie", options.movie}, {"--contact-sheet", options.contactSheet}})
+    for (const auto& [other, value] : {std::pair{"--shard", options.shard}, {"--only", options.only}})
+      if (!path.empty() && !value.empty())
+        throw CLI::ValidationError(name,
+                                   fmt::format("shows all frames, and {} makes some of them; when all are "
+                                               "there, call again with --skip-existing and without {}",
+                                               other, other));
+
+  std::vector<int> numbers = options.shard.empty() ? range.frames() : shardOf(range, options.shard);
+  if (!options.only.empty()) {
+    const FrameRange only = parsed("--only", [&] { return FrameRange::parse(options.only); });
+    std::erase_if(numbers, [&](int number) { return !only.contains(number); });
+  }
+  for (const int number : numbers)
+    frames.push_back({number, output.path(number), preview ? preview->path(number) : ""});
+}
+
+void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan) {
+  std::vector<std::string> paths{options.movie, options.contactSheet};
+  if (!plan.frames.empty()) {
+    paths.push_back(plan.frames.front().path);
+    paths.push_back(plan.frames.front().preview);
+  }
+  for (const std::string& path : paths) {
+    if (path.empty()) continue;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    std::error_code error;
+    if (!folder.empty()) std::filesystem::create_directories(folder, error);
+    require(!error, fmt::format("cannot write {}: the folder cannot be made: {}", path, error.message()));
+    const OutputFile trial(path);
+  }
+}
+
+void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run) {
+  run.begin("check");
+  parallelFor(
+      plan.frames.size(), 1,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
+          TurntableFrame& frame = plan.frames[i];
+          const auto isWhole = [&](const std::string& path) {
+            if (path.empty() || !std::filesystem::exists(path)) return false;
+            const std::string what = defect(path, camera.window());
+            if (!what.empty()) run.note(fmt::format("{}: {}; it is made again", path, what));
+            return what.empty();
+          };
+          frame.skipped = isWhole(frame.path);
+          frame.previewSkipped = frame.skipped && isWhole(frame.preview);
+        }
+      },
+      run);
+  const auto skipped = std::ranges::count_if(plan.frames, &TurntableFrame::skipped);
+  if (skipped > 0)
+    run.note(fmt::format("skipping {} of {} frames, which are whole", skipped, plan.frames.size()));
+}
+
+}  // namespace nephele::apps

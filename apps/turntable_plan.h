@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/render_options.h"
+#include "render/frame_range.h"
+#include "render/movie.h"
+#include "render/turntable.h"
+
+namespace nephele::apps {
+
+/// The options of the verb turntable, as typed.
+struct TurntableOptions {
+  std::string input, output, preview, movie, contactSheet;
+  std::string frames, only, shard;
+  Orbit orbit = Orbit::camera;
+  double turns = 1;
+  bool skipExisting = false;
+  MovieWriter::Options movieOptions;
+  PictureOptions picture;
+};
+
+/// One frame of a turntable.
+struct TurntableFrame {
+  int number = 0;
+  std::string path;
+  /// "" if no preview is wanted.
+  std::string preview;
+  /// The files are there and whole, and are left as they are.
+  bool skipped = false, previewSkipped = false;
+  double seconds = 0;
+};
+
+/// What a call of the verb has to make.
+struct TurntablePlan {
+  /// First and last of the whole turntable, of which `frames` may be a part.
+  int first = 0, last = 0;
+  std::vector<TurntableFrame> frames;
+
+  /// @throws CLI::ValidationError naming the option that is wrong.
+  explicit TurntablePlan(const TurntableOptions& options);
+};
+
+/// Makes the folders of all outputs, and finds out whether files can be written there.
+/// @throws Error naming the path.
+void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan);
+
+/// Marks as skipped what is there, is whole (readable to its last row) and is a picture of `camera`'s size;
+/// notes what is there and is not.
+void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run);
+
+/// Makes the frames that are not skipped, one after another, each on all threads: frames side by side would
+/// need the memory of as many pictures, and be no faster. Fills in their seconds and the run's statistics.
+void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
+                const RenderVolume& volume, const Camera& start, Run& run);
+
+/// Reads all frames again, and makes the movie and the contact sheet of them, where they are wanted.
+void makeMovieAndSheet(const TurntablePlan& plan, const TurntableOptions& options,
+                       const PictureOptions& picture, Run& run);
+
+}  // namespace nephele::apps

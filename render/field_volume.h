@@ -1,0 +1,39 @@
+#pragma once
+
+#include "modeling/box.h"
+#include "modeling/field.h"
+#include "modeling/progress.h"
+#include "render/camera.h"
+#include "render/render_volume.h"
+
+namespace nephele {
+
+/// How finely a field is looked at.
+struct FieldVolumeOptions {
+  /// Where there may be density, world units; outside there is none.
+  Box box;
+  /// Voxels across a pixel, at the place nearest to the camera where the picture shows density.
+  float voxelsPerPixel = 1.0f;
+  /// Bytes that the bricks may take; voxels grow until they fit.
+  double mostBytes = 1e9;
+};
+
+/// The voxel size of `fieldVolume`, world units: the width of a pixel there, over voxelsPerPixel, but no less
+/// than a 10^5th of the box and as much more as the memory asks for. A 64th of the box where the picture
+/// shows no density. Cost: ranges of the field over some 10^4 boxes, and more where the memory is short.
+/// @throws Error if the box is empty or unbounded, or a number is not above 0.
+float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                     const Progress& progress = silent());
+
+/// A density that is a field and not a grid, as finely as the picture of `camera` can show it: nobody has to
+/// choose a voxel size. Ranges of the field tell where it is above zero, and only there it is evaluated;
+/// values below zero count as zero. Come nearer, and there is more to see, as long as the memory lasts: a
+/// camera inside the density gets what `mostBytes` allow.
+///
+/// Structure narrower than two voxels is sampled and not averaged. Moving cameras are asked for where the
+/// shutter opens, is half open and closes. The same bits at any number of threads.
+/// @throws Error as fieldVoxelSize and bakeGrid do; Cancelled.
+RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                         const Progress& progress = silent());
+
+}  // namespace nephele

@@ -1,0 +1,121 @@
+// The options of lights, through the program.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "levelset/vdb_io.h"
+#include "render/exr_io.h"
+#include "tests/support/density.h"
+#include "tests/support/run_program.h"
+
+namespace nephele::test {
+namespace {
+
+class LightOptions : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    data_ = new TemporaryFolder;
+    writeVdbFile(data_->file("ball.vdb"),
+                 {toVdb(*ball(1.0f, 0.1f), {"density", VdbGridInfo::Class::fogVolume})}, {});
+    Image map;
+    map.width = 32;
+    map.height = 16;
+    for (const char* name : {"R", "G", "B"}) map.add(name, false).values.assign(512, 0.5f);
+    writeExr(data_->file("map.exr"), map, Camera::framing({}, 0, 0, {32, 16, 35}));
+    std::ofstream(data_->file("broken.hdr")) << "#?RADIANCE\n\n-Y 2 +X 4\n";
+  }
+  static void TearDownTestSuite() { delete data_; }
+
+  static ProgramResult render(const std::string& options, const std::string& name = "a.exr") {
+    return runProgram(fmt::format("render '{}' -o '{}' --size 16x12 --samples 1 {}", data_->file("ball.vdb"),
+                                  data_->file(name), options));
+  }
+  static Image picture(const std::string& options) {
+    const ProgramResult result = render(options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(data_->file("a.exr"));
+  }
+  static std::string file(const std::string& name) { return "'" + data_->file(name) + "'"; }
+
+  static TemporaryFolder* data_;
+};
+TemporaryFolder* LightOptions::data_ = nullptr;
+
+TEST_F(LightOptions, EveryLightHasALayerOfItsName) {
+  const Image image = picture(
+      "--aov light --sun 30,40 --sun key=90,20,2 --point 0,3,0,5 --point lamp=2,0,0,1,2,3 "
+      "--spot 0,0,4,0,0,0,20,5,10");
+  double sum = 0;
+  for (const char* name : {"sun", "key", "point", "lamp", "spot", "sky"}) {
+    const float value = image.at(fmt::format("light_{}.G", name), 8, 6);
+    EXPECT_GT(value, 0) << name;
+    sum += double(value);
+  }
+  // R, G, B are 16 bit.
+  EXPECT_NEAR(sum, double(image.at("G", 8, 6)), 1e-3 * sum);
+}
+
+TEST_F(LightOptions, WithoutLightsThePictureIsBlackWithAlpha) {
+  const Image image = picture("--sun none --sky 0,0,0");
+  EXPECT_EQ(image.at("R", 8, 6), 0);
+  EXPECT_GT(image.at("A", 8, 6), 0.99f);
+}
+
+TEST_F(LightOptions, ShadowMultipliersLetColoursThrough) {
+  const std::string light = "--sky 0,0,0 --octaves 1 --sun 205,-5,10 ";
+  const Image plain = picture(light), coloured = picture(light + "--shadow-multiplier sun=1,0.3,0.05");
+  EXPECT_EQ(coloured.at("R", 8, 6), plain.at("R", 8, 6));
+  EXPECT_GT(coloured.at("B", 8, 6), 2 * plain.at("B", 8, 6) + 1e-3f);
+}
+
+TEST_F(LightOptions, SkyMapsAreSkies) {
+  const Image map = picture("--sun none --sky " + file("map.exr") + " --sky-intensity 2");
+  const Image constant = picture("--sun none --sky 1,1,1");
+  // The iteration for the light ends at 1.5e-3 of it; 16 bit.
+  EXPECT_NEAR(map.at("G", 8, 6), constant.at("G", 8, 6), 4e-3f * constant.at("G", 8, 6));
+}
+
+TEST_F(LightOptions, DeepShadowsGoThroughFiles) {
+  const std::string light = "--sky 0,0,0 --octaves 1 --sun 90,38 ";
+  const Image plain = picture(light);
+  const Image deep = picture(light + "--shadows deep --write-deep-shadow " + file("shadow.exr"));
+  const Image read = picture(light + "--read-deep-shadow sun=" + file("shadow.exr"));
+  const float value = plain.at("R", 8, 6);
+  EXPECT_NEAR(deep.at("R", 8, 6), value, 0.03f * value);
+  EXPECT_NEAR(read.at("R", 8, 6), deep.at("R", 8, 6), 2e-3f * value);
+}
+
+TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
+  const struct {
+    std::string options, message;
+    int exitCode;
+  } cases[] = {
+      {"--point 1,2,3", "--point: got '1,2,3'", 2},
+      {"--point 1,2,3,-4", "--point: got '1,2,3,-4'", 2},
+      {"--spot 0,0,4,0,0,0,95,5,10", "--spot: got '0,0,4,0,0,0,95,5,10'", 2},
+      {"--sun 1,2,3,4", "--sun: got '1,2,3,4'", 2},
+      {"--light-decay cubic", "--light-decay: got 'cubic'", 2},
+      {"--shadow-multiplier 1,2", "--shadow-multiplier: got '1,2'", 2},
+      {"--sky 1,2", "--sky: got '1,2'", 2},
+      {"--write-deep-shadow a.png", "--write-deep-shadow: got 'a.png'", 2},
+      {"--shadow-multiplier lamp=1,1,1", "no light is called 'lamp'; there are: sun", 1},
+      {"--sun a=1,2 --point a=1,2,3,4", "the name 'a' is taken twice", 1},
+      {"--point 1e9,0,0,4", "use a sun", 1},
+      {"--point 1,2,3,1e30", "point: expected three numbers", 1},
+      {"--sky nowhere.exr", "nowhere.exr: cannot be read", 1},
+      {"--sky " + file("broken.hdr"), "broken.hdr: ends before its last pixel", 1},
+      {"--read-deep-shadow " + file("map.exr"), "map.exr: is not a deep image", 1},
+      {"--point 0.1,0,0,1 --shadows deep", "choose shadows from a volume", 1},
+      {"--shadows deep --integrator path", "deep shadow maps can only be marched", 1},
+  };
+  for (const auto& c : cases) {
+    const ProgramResult result = render(c.options, "bad.exr");
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.options;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.options << ": " << result.errors;
+    EXPECT_FALSE(std::filesystem::exists(data_->file("bad.exr")));
+  }
+}
+
+}  // namespace
+}  // namespace nephele::test

@@ -1,0 +1,226 @@
+// Layers, deep pictures and holdouts of the verb render, through the program.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "levelset/vdb_io.h"
+#include "render/deep_image.h"
+#include "render/exr_io.h"
+#include "tests/support/density.h"
+#include "tests/support/run_program.h"
+
+namespace nephele::test {
+namespace {
+
+class RenderLayers : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    writeVdbFile(fog(), {toVdb(*ball(1.0f, 0.1f), {"density", VdbGridInfo::Class::fogVolume})}, {});
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static std::string fog() { return folder_->file("fog.vdb"); }
+  static std::string start() { return "render " + fog() + " --size 32x24 --quiet -o "; }
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+TEST_F(RenderLayers, AreWrittenUnderTheirNames) {
+  const TemporaryFolder folder;
+  const ProgramResult result = runProgram(
+      start() + folder.file("a.exr") +
+      " --aov Z,Z_median,Z_mean,normal,position,motion,light,transmittance,albedo --view 0,0 --samples 1");
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Image image = readImage(folder.file("a.exr"));
+  for (const char* name : {"Z", "Z_median", "Z_mean", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "motion.X",
+                           "motion.Y", "light_sun.R", "light_sky.B", "transmittance.G", "albedo.G"})
+    ASSERT_TRUE(image.find(name)) << name;
+  // The front of a dense ball, seen from +z.
+  EXPECT_LE(image.at("Z", 16, 12), image.at("Z_median", 16, 12));
+  EXPECT_NEAR(image.at("P.Z", 16, 12), 1.0f, 0.15f);
+  EXPECT_GT(image.at("N.Z", 16, 12), 0.9f);
+  EXPECT_NEAR(image.at("albedo.G", 16, 12), 0.99f * image.at("A", 16, 12), 1e-3f);
+  EXPECT_TRUE(std::isinf(image.at("Z_median", 0, 0)));
+  EXPECT_EQ(runProgram(start() + folder.file("a.exr") + " --aov none").exitCode, 0);
+  EXPECT_EQ(readImage(folder.file("a.exr")).channels.size(), 4u);
+}
+
+TEST_F(RenderLayers, SayHowAnAnimatedCameraMovesThePicture) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("a.chan")) << "1 0 0 10 0 0 0 40\n2 2 0 10 0 0 0 40\n3 4 0 10 0 0 0 40\n";
+  const std::string options = " --aov motion,Z_median --extinction 50 --camera " + folder.file("a.chan");
+  for (const char* frame : {"1", "3"}) {
+    ASSERT_EQ(runProgram(start() + folder.file("a.exr") + options + " --frame " + frame).exitCode, 0);
+    const Image image = readImage(folder.file("a.exr"));
+    const int x = int(std::max_element(image.channel("A").values.begin() + 12 * 32,
+                                       image.channel("A").values.begin() + 13 * 32) -
+                      image.channel("A").values.begin()) %
+                  32;
+    // Two units to the left in a frame, by pixels per unit at that depth: the .chan angle is the vertical
+    // one.
+    const double perUnit = 24 / (2 * std::tan(20 * double(kPi) / 180) * image.at("Z_median", x, 12));
+    EXPECT_NEAR(image.at("motion.X", x, 12), -2 * perUnit, 0.01 * perUnit);
+    EXPECT_NEAR(image.at("motion.Y", x, 12), 0, 1e-4);
+  }
+}
+
+TEST_F(RenderLayers, DeepPicturesFlattenToThePictureAtAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  const std::string options = " --extinction 4 --deep " + folder.file("d.exr");
+  ASSERT_EQ(runProgram(start() + folder.file("a.exr") + options + " --threads 1").exitCode, 0);
+  const std::string one = textOf(folder.file("d.exr"));
+  ASSERT_EQ(
+      runProgram(start() + folder.file("a.exr") + options + " --stats " + folder.file("s.json")).exitCode, 0);
+  const Image image = readImage(folder.file("a.exr"));
+  const DeepImage deep = readDeepExr(folder.file("d.exr"));
+  for (int y = 0; y != 24; ++y)
+    for (int x = 0; x != 32; ++x) {
+      const FlatPixel flat = flattened(deep.at(x, y));
+      ASSERT_NEAR(flat.alpha, image.at("A", x, y), 5e-4f);
+      ASSERT_NEAR(flat.colour.x, image.at("R", x, y), 1e-3f * (1 + image.at("R", x, y)));
+    }
+  EXPECT_EQ(nlohmann::json::parse(textOf(folder.file("s.json")))["deep_samples"], deep.sampleCount());
+  // All but the command line, which both files hold.
+  const DeepImage again = [&] {
+    std::ofstream(folder.file("one.exr"), std::ios::binary) << one;
+    return readDeepExr(folder.file("one.exr"));
+  }();
+  ASSERT_EQ(again.sampleCount(), deep.sampleCount());
+  for (std::size_t i = 0; i != deep.pixels.size(); ++i)
+    for (std::size_t k = 0; k != deep.pixels[i].size(); ++k) {
+      ASSERT_EQ(again.pixels[i][k].z, deep.pixels[i][k].z);
+      ASSERT_EQ(again.pixels[i][k].alpha, deep.pixels[i][k].alpha);
+      ASSERT_EQ(again.pixels[i][k].colour, deep.pixels[i][k].colour);
+    }
+}
+
+TEST_F(RenderLayers, AHoldoutInTheMiddleLeavesTheFrontHalf) {
+  // A wall through the middle of the ball, in the plane of the picture, at the camera's distance of 9.
+  const TemporaryFolder folder;
+  const Camera camera = Camera::lookingAt({0, 0, 9}, {0, 0, 0}, {0, 1, 0}, {32, 24, 20.0f});
+  DeepImage wall;
+  wall.width = 32;
+  wall.height = 24;
+  wall.pixels.assign(32 * 24, {{9, 9, 1, {}}});
+  writeDeepExr(folder.file("wall.exr"), wall, camera);
+  const std::string options = " --camera-position 0,0,9 --look-at 0,0,0 --fov 20 --extinction 0.6931472 ";
+  ASSERT_EQ(
+      runProgram(start() + folder.file("a.exr") + options + "--holdout " + folder.file("wall.exr")).exitCode,
+      0);
+  // exp(-ln 2) of the light gets through a radius of the ball; an element behind the wall would find alpha 0.
+  EXPECT_NEAR(readImage(folder.file("a.exr")).at("A", 16, 12), 0.5f, 0.01f);
+}
+
+// A square of edge 6 in the plane z, facing +z, with texture coordinates.
+std::string writeSquare(const TemporaryFolder& folder, const std::string& name, float z) {
+  std::ofstream file(folder.file(name));
+  for (const char* corner : {"-3 -3 ", "3 -3 ", "3 3 ", "-3 3 "}) file << "v " << corner << z << "\n";
+  file << "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+  return folder.file(name);
+}
+
+TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
+  const TemporaryFolder folder;
+  const std::string options =
+      " --camera-position 0,0,9 --look-at 0,0,0 --fov 20 --sun 0,0,3.1415927 --sky 0,0,0 ";
+  const std::string wall = writeSquare(folder, "wall.obj", -2), middle = writeSquare(folder, "middle.obj", 0);
+  const auto make = [&](const std::string& more) {
+    const std::string extinction =
+        more.find("--extinction") == std::string::npos ? "--extinction 0.6931472 " : "";
+    const ProgramResult result = runProgram(start() + folder.file("a.exr") + options + extinction + more);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file("a.exr"));
+  };
+  // Irradiance pi makes the radiance of a surface its colour; beside the ball nothing else is there.
+  const Image image = make("--aov light --object " + wall + " --object-colour 0.6,0.4,0.2");
+  EXPECT_NEAR(image.at("R", 2, 12), 0.6f, 2e-3f);
+  EXPECT_NEAR(image.at("B", 2, 12), 0.2f, 2e-3f);
+  EXPECT_EQ(image.at("A", 2, 12), 1.0f);
+  EXPECT_EQ(image.at("A", 16, 12), 1.0f);
+  // In the shadow of the ball, and behind it: a quarter twice.
+  EXPECT_NEAR(image.at("light_objects.R", 16, 12), 0.6f / 16, 6e-3f);
+  EXPECT_EQ(
+      make("--aov light --threads 1 --object " + wall + " --object-colour 0.6,0.4,0.2").channel("R").values,
+      image.channel("R").values);
+  // Fields of 3 units: the lower left and upper right ones are bright.
+  const Image checked = make("--checker 2 --object " + wall);
+  EXPECT_NEAR(checked.at("R", 2, 20), 0.5f, 2e-3f);
+  EXPECT_NEAR(checked.at("R", 2, 3), 0.125f, 2e-3f);
+  // A holdout through the middle of the ball leaves half, and nothing beside it.
+  const Image held = make("--holdout-object " + middle);
+  EXPECT_NEAR(held.at("A", 16, 12), 0.5f, 0.02f);
+  EXPECT_EQ(held.at("A", 2, 12), 0.0f);
+  // The ground reaches to the horizon, in the middle of the picture.
+  const Image ground = make("--ground --backdrop --preview " + folder.file("a.png"));
+  EXPECT_EQ(ground.at("A", 2, 23), 1.0f);
+  EXPECT_EQ(ground.at("A", 2, 1), 0.0f);
+  ASSERT_TRUE(ground.find("backdrop.B"));
+  // Level sets are objects, too.
+  const std::string levelSet = folder.file("ball.vdb");
+  auto shape = test::densityGrid(test::voxels(0.1f), {-14, -14, -14}, {14, 14, 14}, [](const Vec3f& p) {
+    return std::clamp(0.5f - length(p - Vec3f{0, 0, 0.5f}), -0.3f, 0.3f);
+  });
+  shape->background = -0.3f;
+  writeVdbFile(levelSet, {toVdb(*shape, {"surface", VdbGridInfo::Class::levelSet})}, {});
+  EXPECT_NEAR(make("--aov position --samples 1 --extinction 0.001 --object " + levelSet).at("P.Z", 16, 12),
+              1.0f, 0.02f);
+}
+
+TEST_F(RenderLayers, ObjectsThatCannotBeAreRefused) {
+  const TemporaryFolder folder, files;
+  std::ofstream(files.file("bare.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::string bare = files.file("bare.obj"), wall = writeSquare(files, "wall.obj", 0);
+  const struct {
+    std::string arguments;
+    int exitCode;
+    std::string message;
+  } cases[] = {{"--object " + files.file("none.obj"), 1, "none.obj"},
+               {"--object " + fog(), 1, "not a level set"},
+               {"--object " + bare + " --checker 8", 1, "bare.obj"},
+               {"--object " + bare + " --checker -1", 2, "--checker"},
+               {"--object " + wall + " --texture " + files.file("none.png"), 1, "none.png"},
+               {"--object " + wall + " --object-colour 2,0,0", 2, "--object-colour"},
+               {"--checker 4", 2, "--object"},
+               {"--ground-height 3", 2, "--ground"},
+               {"--ground --integrator path --spp 1", 2, "--integrator"}};
+  for (const auto& c : cases) {
+    const ProgramResult result = runProgram(start() + folder.file("a.exr") + " " + c.arguments);
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST_F(RenderLayers, RefuseWhatCannotBe) {
+  const TemporaryFolder folder, files;
+  ASSERT_EQ(runProgram(start() + files.file("a.exr") + " --deep " + files.file("d.exr")).exitCode, 0);
+  const struct {
+    std::string arguments;
+    int exitCode;
+    std::string message;
+  } cases[] = {{"--aov depth", 2, "--aov"},
+               {"--aov Z,Z", 1, "named twice"},
+               {"--deep " + folder.file("d.tif"), 2, "--deep"},
+               {"--integrator path --spp 1 --deep " + folder.file("d.exr"), 2, "--deep"},
+               {"--integrator path --spp 1 --holdout " + files.file("d.exr"), 2, "--holdout"},
+               {"--holdout " + files.file("none.exr"), 1, "none.exr"},
+               {"--holdout " + files.file("a.exr"), 1, "not a deep image"},
+               {"--holdout " + fog(), 1, "fog.vdb"},
+               {"--deep " + folder.file("missing/d.exr"), 1, "missing/d.exr"}};
+  for (const auto& c : cases) {
+    const ProgramResult result = runProgram(start() + folder.file("a.exr") + " " + c.arguments);
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
+    std::filesystem::remove(folder.file("a.exr"));
+  }
+  const ProgramResult other = runProgram("render " + fog() + " -o " + folder.file("a.exr") +
+                                         " --size 16x16 --holdout " + files.file("d.exr"));
+  EXPECT_EQ(other.exitCode, 1);
+  EXPECT_NE(other.errors.find("32x24"), std::string::npos) << other.errors;
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+}  // namespace
+}  // namespace nephele::test
