@@ -283,7 +283,7 @@ Lights LightOptions::resolved() const {
     requireLight("--light-decay", name, known, result);
   }
   for (const auto& [name, said] : shadows)
-    forLights("--shadow-multiplier", name, result, [&](auto& light) { light.shadow = said; });
+    forLights("--shadow-multiplier", name, result, [&, value = said](auto& light) { light.shadow = value; });
   if (deepShadows) result.deepTolerance = deepTolerance;
   for (const auto& [name, file] : readShadows) {
     const auto map = std::make_shared<const DeepShadowMap>(DeepShadowMap::read(file));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+
 #include "render/film.h"
 
 namespace nephele::apps {

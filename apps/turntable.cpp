@@ -59,7 +59,8 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
 
-  const RenderVolume volume = readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
+  const RenderVolume volume =
+      readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
   const PictureOptions picture = options.picture.resolved(volume);
   const Camera start = firstCamera(options, picture, volume);

@@ -78,7 +78,9 @@ class FrameMaker {
                       : LitVolume(volume_, picture_.medium, lights, picture_.render.octaves, progress);
       lightSeconds_ += light_->lightSeconds();
     }
-    return light_->render(camera, picture_.marched(camera), progress);
+    RenderOptions options = picture_.marched(camera);
+    if (picture_.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
+    return light_->render(camera, options, progress);
   }
 
   double lightSeconds() const { return lightSeconds_; }

@@ -134,8 +134,8 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
         return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
       if (grid->isType<openvdb::Vec3DGrid>())
         return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
-      failReading(path,
-                  fmt::format("grid '{}' holds {} values; a grid of vectors is needed", name, grid->valueType()));
+      failReading(path, fmt::format("grid '{}' holds {} values; a grid of vectors is needed", name,
+                                    grid->valueType()));
     });
   }
   failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));

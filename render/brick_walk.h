@@ -79,7 +79,7 @@ inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take
     if (!(cursor < s1)) return true;
     const int count = int(std::ceil((s1 - cursor) / ds));
     // The last of steps longer than a voxel must not reach into a brick that differs.
-    if (uniform) ds = (s1 - cursor) / float(count);
+    if (uniform || (ray.isCut && s1 >= ray.length)) ds = (s1 - cursor) / float(count);
     const float start = cursor;
     cursor += float(count) * ds;
     return take(start, ds, count);

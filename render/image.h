@@ -63,8 +63,8 @@ struct ViewTransform {
 /// missing.
 std::vector<float> displayed(const Image& image, const ViewTransform& view);
 
-/// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands still
-/// from frame to frame.
+/// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands
+/// still from frame to frame.
 std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view);
 
 }  // namespace nephele

@@ -274,19 +274,33 @@ void LightVolume::add(const std::function<float(const Vec3f& world)>& column) {
   });
 }
 
+void detail::replaceBrick(const std::function<float(const Vec3i&)>& column, float* out) {
+  constexpr int n = LightVolume::kWidth, wide = n + 2, plane = wide * wide;
+  std::array<float, wide * plane> values;
+  for (int k = 0; k != wide; ++k)
+    for (int j = 0; j != wide; ++j)
+      for (int i = 0; i != wide; ++i)
+        values[std::size_t(k * plane + j * wide + i)] = column({i - 1, j - 1, k - 1});
+  for (int k = 0; k != n; ++k)
+    for (int j = 0; j != n; ++j)
+      for (int i = 0; i != n; ++i) {
+        const float* at = values.data() + (k + 1) * plane + (j + 1) * wide + i + 1;
+        const float across = at[-1] + at[1] + at[-wide] + at[wide] - 4 * *at,
+                    along = at[-plane] + at[plane] - 2 * *at;
+        *out++ = *at - (2 * across + along) / 12;
+      }
+}
+
 void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
   const Affine latticeToWorld = inverse(worldToLattice_);
   parallelFor(table_.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t entry = begin; entry != end; ++entry) {
       if (!table_[entry]) continue;
       const auto nx = std::size_t(brickCount_.x), ny = std::size_t(brickCount_.y);
-      const Vec3i brick =
-          firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))};
-      float* out = values_.data() + std::size_t(table_[entry]) * kVolume;
-      for (int k = 0; k != kWidth; ++k)
-        for (int j = 0; j != kWidth; ++j)
-          for (int i = 0; i != kWidth; ++i)
-            *out++ = column(latticeToWorld(Vec3f(brick * kBrick + Vec3i{i, j, k})));
+      const Vec3i node =
+          (firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))}) * kBrick;
+      detail::replaceBrick([&](const Vec3i& at) { return column(latticeToWorld(Vec3f(node + at))); },
+                           values_.data() + std::size_t(table_[entry]) * kVolume);
     }
   });
 }

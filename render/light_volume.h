@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <functional>
 #include <vector>
 
 #include "modeling/progress.h"
@@ -28,7 +27,8 @@ class LightVolume {
   /// @throws Error if `towards` is zero or not finite.
   LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent());
 
-  /// Sets c at every node to `column` of its place in the world, in place of the sweep's. Uses all cores.
+  /// Sets c at every node to `column` of its place in the world, in place of the sweep's; it is taken to be
+  /// interpolated itself, between rays that are as far apart as nodes. Uses all cores.
   void replace(const std::function<float(const Vec3f&)>& column);
 
   /// From world space to this lattice, whose nodes are integers.
@@ -68,5 +68,11 @@ class LightVolume {
   std::vector<std::int32_t> table_;
   std::vector<float> values_;
 };
+
+namespace detail {
+/// The nodes of a brick from `column` of each, also of those a node outside of it, less the mean error of
+/// linear interpolation: once along the light, twice across, see LightVolume::replace.
+void replaceBrick(const std::function<float(const Vec3i&)>& column, float* out);
+}  // namespace detail
 
 }  // namespace nephele

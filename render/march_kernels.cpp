@@ -250,8 +250,8 @@ class Marcher {
             hn::Mul(hn::Load(d, ds_ + i), hn::Set(d, scene_.extinction * scene_.emissionScale));
         for (int c = 0; c != 3; ++c) {
           const Floats t = hn::Mul(own, hn::Set(d, scene_.extinctionColour[c]));
-          const Floats thin = hn::NegMulAdd(
-              t, hn::NegMulAdd(t, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
+          const Floats thin =
+              hn::NegMulAdd(t, hn::NegMulAdd(t, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
           const Floats mean =
               hn::IfThenElse(hn::Lt(t, hn::Set(d, 0.03f)), hn::Mul(hn::LoadU(d, through[c] + i), thin),
                              hn::Div(weight[c], hn::Max(t, hn::Set(d, 0.03f))));
@@ -327,8 +327,7 @@ class Marcher {
         const Floats area = hn::Mul(away, length), x = hn::MulAdd(first, last, away2);
         const Floats tangent = hn::Div(area, hn::IfThenElse(hn::Eq(x, zero), hn::Set(d, 1e-30f), x));
         const Floats acute = hn::Atan(d, tangent);
-        const Floats angle =
-            hn::IfThenElse(hn::Lt(x, zero), hn::Add(acute, hn::Set(d, 3.14159265f)), acute);
+        const Floats angle = hn::IfThenElse(hn::Lt(x, zero), hn::Add(acute, hn::Set(d, 3.14159265f)), acute);
         decay = hn::Div(angle, area);
         if (light.decayStart > 0)
           decay = hn::IfThenElse(hn::Lt(r, start), hn::Div(one, hn::Mul(start, start)), decay);
@@ -344,23 +343,21 @@ class Marcher {
         const Floats t = hn::Min(
             hn::Max(hn::Mul(hn::Sub(c, hn::Set(d, light.outerCosine)), hn::Set(d, light.perCosine)), zero),
             one);
-        decay = hn::Mul(
-            decay, hn::Mul(hn::Mul(t, t), hn::NegMulAdd(hn::Set(d, 2.0f), t, hn::Set(d, 3.0f))));
+        decay = hn::Mul(decay, hn::Mul(hn::Mul(t, t), hn::NegMulAdd(hn::Set(d, 2.0f), t, hn::Set(d, 3.0f))));
         if (hn::AllTrue(d, hn::Eq(decay, zero))) return;
       }
       share = decay;
     }
-    const Floats depth =
-        hn::Mul(hn::Max(localColumn(light, line, s), zero), hn::Set(d, scene_.extinction));
+    const Floats depth = hn::Mul(hn::Max(localColumn(light, line, s), zero), hn::Set(d, scene_.extinction));
 
     const Floats a = hn::Div(one, hn::Sqrt(hn::MulAdd(first, first, away2))),
                  b = hn::Div(one, hn::Sqrt(hn::MulAdd(last, last, away2)));
     const Floats across = hn::Mul(away, hn::Add(a, b)), forward = hn::MulAdd(first, a, hn::Mul(last, b));
     const Floats norm = hn::Sqrt(hn::MulAdd(across, across, hn::Mul(forward, forward)));
     const Floats sine = hn::Div(forward, hn::Max(norm, hn::Set(d, 1e-30f)));
-    const Floats place = hn::Mul(
-        hn::Sqrt(hn::Min(hn::Max(hn::Mul(hn::Add(one, sine), hn::Set(d, 0.5f)), zero), one)),
-        hn::Set(d, float(MarchScene::Local::kPhaseNodes) - 0.001f));
+    const Floats place =
+        hn::Mul(hn::Sqrt(hn::Min(hn::Max(hn::Mul(hn::Add(one, sine), hn::Set(d, 0.5f)), zero), one)),
+                hn::Set(d, float(MarchScene::Local::kPhaseNodes) - 0.001f));
     const IntLanes i;
     const Ints node = hn::ConvertTo(i, place);
     const Floats part = hn::Sub(place, hn::ConvertTo(d, node));
@@ -379,9 +376,8 @@ class Marcher {
         for (int c = 0; c != scene_.colours; ++c) result[c] += sum * light.albedo[c];
       } else {
         for (int c = 0; c != kColours; ++c)
-          result[c] += light.albedo[c] * seen(scene_.attenuation[n] * light.shadow[c] *
-                                                  scene_.extinctionColour[c],
-                                              weight[c]);
+          result[c] += light.albedo[c] *
+                       seen(scene_.attenuation[n] * light.shadow[c] * scene_.extinctionColour[c], weight[c]);
       }
     }
   }
@@ -393,9 +389,16 @@ class Marcher {
     const Floats x = hn::Abs(q.x), y = hn::Abs(q.y), z = hn::Abs(q.z);
     Floats column = hn::Zero(d);
     for (const MarchScene::Local::Face& face : light.faces) {
-      const Floats u = face.axis == 0 ? q.y : face.axis == 1 ? q.z : q.x,
-                   v = face.axis == 0 ? q.z : face.axis == 1 ? q.x : q.y,
-                   w = hn::Mul(face.axis == 0 ? q.x : face.axis == 1 ? q.y : q.z, hn::Set(d, face.side));
+      const Floats u = face.axis == 0   ? q.y
+                       : face.axis == 1 ? q.z
+                                        : q.x,
+                   v = face.axis == 0   ? q.z
+                       : face.axis == 1 ? q.x
+                                        : q.y,
+                   w = hn::Mul(face.axis == 0   ? q.x
+                               : face.axis == 1 ? q.y
+                                                : q.z,
+                               hn::Set(d, face.side));
       const auto inFront = hn::Gt(w, hn::Zero(d));
       const auto mine = light.faces.size() == 1 ? inFront
                         : face.axis == 0        ? hn::And(inFront, hn::And(hn::Ge(x, y), hn::Ge(x, z)))
@@ -404,11 +407,10 @@ class Marcher {
       if (hn::AllFalse(d, mine)) continue;
       const Floats depth = hn::Max(w, hn::Set(d, light.least)),
                    scale = hn::Div(hn::Set(d, face.perTangent), depth);
-      const Point p{
-          hn::Sub(hn::MulAdd(u, scale, hn::Set(d, line.shift.x)), hn::Set(d, face.corner.x)),
-          hn::Sub(hn::MulAdd(v, scale, hn::Set(d, line.shift.y)), hn::Set(d, face.corner.y)),
-          hn::Sub(hn::MulAdd(depth, hn::Set(d, face.perDepth), hn::Set(d, line.shift.z)),
-                  hn::Set(d, face.corner.z))};
+      const Point p{hn::Sub(hn::MulAdd(u, scale, hn::Set(d, line.shift.x)), hn::Set(d, face.corner.x)),
+                    hn::Sub(hn::MulAdd(v, scale, hn::Set(d, line.shift.y)), hn::Set(d, face.corner.y)),
+                    hn::Sub(hn::MulAdd(depth, hn::Set(d, face.perDepth), hn::Set(d, line.shift.z)),
+                            hn::Set(d, face.corner.z))};
       column = hn::IfThenElse(mine, sampleBricks<LightVolume::kWidth, 0>(face, p), column);
     }
     return column;
@@ -563,16 +565,16 @@ void addLocal(const MarchScene& scene, const MarchRay& ray, std::size_t index, f
     const float phase = table[0] + (place - float(node)) * (table[1] - table[0]);
     for (int c = 0; c != scene.colours; ++c)
       result[c] += weight[c] * light.albedo[c] * phase * float(decay) *
-                   std::exp(-std::min(column * scene.attenuation[n] * scene.extinctionColour[c] *
-                                          light.shadow[c],
-                                      80.0f));
+                   std::exp(-std::min(
+                       column * scene.attenuation[n] * scene.extinctionColour[c] * light.shadow[c], 80.0f));
   }
 }
 
 // One step; false once the ray is as good as opaque.
 bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds, MarchResult& result) {
   std::size_t cursor = 0;
-  const float seen = ray.holdout.transmittance((ray.start + s + (0.5f - ray.jitter) * ds) * ray.cosine, cursor);
+  const float seen =
+      ray.holdout.transmittance((ray.start + s + (0.5f - ray.jitter) * ds) * ray.cosine, cursor);
   const auto at = [s](const LatticeRay& line) { return line.origin + line.direction * s; };
   ++result.samples;
   const float density =
@@ -597,7 +599,8 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
     if (scene.emission.table) {
       const double t = double(scene.extinction) * density * ds * scene.extinctionColour[c];
       const double mean = t > 0 ? double(before) * -std::expm1(-t) / t : double(before);
-      result.emission[c] += scene.extinction * scene.emissionScale * ds * threeAt(scene.emission, c) * float(mean) * seen;
+      result.emission[c] +=
+          scene.extinction * scene.emissionScale * ds * threeAt(scene.emission, c) * float(mean) * seen;
     }
     if (scene.colour.table) weight[c] *= density > 0 ? threeAt(scene.colour, c) / density : 0.0f;
   }
@@ -611,11 +614,10 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
         scene.extinction * std::max(sample(scene.suns[sun], at(ray.suns[sun]), LightVolume::kWidth, 0), 0.0f);
     for (int c = 0; c != scene.colours; ++c)
       for (int n = 0; n != scene.octaves; ++n)
-        result.suns[sun][c] +=
-            weight[c] * ray.weight[sun][c][n] *
-            std::exp(-std::min(column * scene.attenuation[n] * scene.extinctionColour[c] *
-                                   scene.suns[sun].shadow[c],
-                               80.0f));
+        result.suns[sun][c] += weight[c] * ray.weight[sun][c][n] *
+                               std::exp(-std::min(column * scene.attenuation[n] * scene.extinctionColour[c] *
+                                                      scene.suns[sun].shadow[c],
+                                                  80.0f));
   }
   for (std::size_t i = 0; i != scene.locals.size(); ++i)
     addLocal(scene, ray, i, s, ds, weight, result.suns[scene.suns.size() + i]);

@@ -166,10 +166,12 @@ struct MarchRay {
   /// Weight of every octave of every sun: phase, contribution and albedo, per colour.
   float weight[MarchScene::kMostSuns][3][MarchScene::kMostOctaves];
   HoldoutCurve holdout{};
+  /// Something opaque is at the end, so that the last step must not reach beyond it.
+  bool isCut = false;
 };
 
-/// What a ray gathers. Multiply `suns`, which the locals follow, by irradiance or intensity, `sky` by the sky's
-/// radiance.
+/// What a ray gathers. Multiply `suns`, which the locals follow, by irradiance or intensity, `sky` by the
+/// sky's radiance.
 struct MarchResult {
   float opticalDepth = 0.0f;
   float suns[MarchScene::kMostLights][3] = {};

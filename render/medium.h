@@ -25,11 +25,11 @@ struct Medium {
 /// it, less what the octave before sees, and is scattered to the eye by the phase function itself for n = 0
 /// and by Henyey-Greenstein's with g^(n + bend) for the others.
 ///
-/// The numbers were fitted to path traced pictures of three clouds (tests/bench/fit_scattering.cpp measures and
-/// fits): optical depths of 150 and 38 across, albedo 0.9 to 1, in a sun from the front, the side or the back
-/// and a tenth as much sky. Left over, up to a mean cosine of 0.3: means within 5 %; regions of 32x32 pixels of
-/// 640x480 3 to 7 % in the root mean square, 3 % of them above 15 %, the worst 28 %, where a cloud is lit from
-/// behind. At a mean cosine of 0.85: means within 11 %, regions 7 to 16 %, the worst 53 %.
+/// The numbers were fitted to path traced pictures of three clouds (tests/bench/fit_scattering.cpp measures
+/// and fits): optical depths of 150 and 38 across, albedo 0.9 to 1, in a sun from the front, the side or the
+/// back and a tenth as much sky. Left over, up to a mean cosine of 0.3: means within 5 %; regions of 32x32
+/// pixels of 640x480 3 to 7 % in the root mean square, 3 % of them above 15 %, the worst 28 %, where a cloud
+/// is lit from behind. At a mean cosine of 0.85: means within 11 %, regions 7 to 16 %, the worst 53 %.
 struct Octaves {
   int count = 3;
   /// On the evenly scattered light of suns: what the lattice's cells lose near a lit surface.

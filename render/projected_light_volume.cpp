@@ -152,7 +152,7 @@ struct ProjectedLightVolume::Sweep {
       for (int i = 0; i != kWidth; ++i) {
         const auto at = std::size_t((j + 1) * kRays + i + 1);
         const float across = sum[at - 1] + sum[at + 1] + sum[at - kRays] + sum[at + kRays] - 4 * sum[at];
-        out[j * kWidth + i] = std::max(sum[at] - (across + after[at] - before[at]) / 12, 0.0f);
+        out[j * kWidth + i] = sum[at] - (across + after[at] - before[at]) / 12;
       }
   }
 };
@@ -309,17 +309,17 @@ void ProjectedLightVolume::replace(const std::function<float(const Vec3f&)>& col
         const auto nx = std::size_t(face.brickCount.x), ny = std::size_t(face.brickCount.y);
         const Vec3i node =
             (face.firstBrick + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))}) * kBrick;
-        float* out = face.values.data() + std::size_t(face.table[entry]) * LightVolume::kVolume;
-        for (int k = 0; k != kWidth; ++k)
-          for (int j = 0; j != kWidth; ++j)
-            for (int i = 0; i != kWidth; ++i) {
-              const float depth = float(node.z + k) / face.perDepth;
+        detail::replaceBrick(
+            [&](const Vec3i& at) {
+              // The first slice before the light is the light.
+              const float depth = std::max(float(node.z + at.z) / face.perDepth, 0.0f);
               Vec3f q;
-              q[(face.axis + 1) % 3] = float(node.x + i) / face.perTangent * depth;
-              q[(face.axis + 2) % 3] = float(node.y + j) / face.perTangent * depth;
+              q[(face.axis + 1) % 3] = float(node.x + at.x) / face.perTangent * depth;
+              q[(face.axis + 2) % 3] = float(node.y + at.y) / face.perTangent * depth;
               q[face.axis] = face.side * depth;
-              *out++ = column(frameToWorld(q));
-            }
+              return column(frameToWorld(q));
+            },
+            face.values.data() + std::size_t(face.table[entry]) * LightVolume::kVolume);
       }
     });
 }

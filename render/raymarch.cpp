@@ -26,13 +26,13 @@
 
 #include "modeling/error.h"
 #include "modeling/parallel.h"
-#include "render/film.h"
 #include "render/deep_shadow.h"
 #include "render/environment.h"
+#include "render/film.h"
 #include "render/light_volume.h"
 #include "render/march_kernels.h"
-#include "render/projected_light_volume.h"
 #include "render/pixel_points.h"
+#include "render/projected_light_volume.h"
 #include "render/scattered_light.h"
 #include "render/surfaces.h"
 
@@ -302,8 +302,7 @@ struct detail::BakedLight {
       for (int n = 0; n != scene.octaves; ++n)
         for (int i = 0; i <= nodes; ++i) {
           const float sine = float(i) / float(nodes), cosine = 1 - 2 * sine * sine;
-          const float next =
-              n + 1 < scene.octaves ? phases[std::size_t(n + 1)](cosine) : 0.0f;
+          const float next = n + 1 < scene.octaves ? phases[std::size_t(n + 1)](cosine) : 0.0f;
           phaseTable.push_back(phases[std::size_t(n)](cosine) - next);
         }
     MarchScene::Local& local = scene.locals.emplace_back();
@@ -369,9 +368,8 @@ struct detail::BakedLight {
               before->scene.colours == scene.colours)
             made = before->scattered[before->scattered.size() - std::size_t(scene.colours - c)];
           else
-            made =
-                scatteredLight(volume, c, once ? 0 : meanAlbedo[c], medium.albedo[c],
-                               sky ? sourceOfSky(c) : ScatteredSource::evenSky(), "sky", progress);
+            made = scatteredLight(volume, c, once ? 0 : meanAlbedo[c], medium.albedo[c],
+                                  sky ? sourceOfSky(c) : ScatteredSource::evenSky(), "sky", progress);
         }
         if (made) {
           toScattered.emplace(made->worldToLattice());
@@ -449,11 +447,11 @@ struct detail::BakedLight {
                                                        const std::string& name,
                                                        const Progress& progress) const {
     progress.begin("scatter " + name);
-    const auto made = std::make_shared<ScatteredLight>(
-        volume,
-        Scattering{scene.extinction * scene.extinctionColour[colour], albedo,
-                   albedo > 0 ? medium.phase.meanCosine() : 0},
-        from, ScatteredLight::Options{}, progress);
+    const auto made =
+        std::make_shared<ScatteredLight>(volume,
+                                         Scattering{scene.extinction * scene.extinctionColour[colour], albedo,
+                                                    albedo > 0 ? medium.phase.meanCosine() : 0},
+                                         from, ScatteredLight::Options{}, progress);
     made->scale(share);
     return made;
   }
@@ -605,7 +603,8 @@ void Picture::preparePoints(const Film& film, const RenderOptions& options) {
 
 bool Picture::centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const {
   world = middle_->ray(x + 0.5, y + 0.5);
-  const double frames = 0.5 * (shutter_.open + shutter_.close), cosine = dot(world.direction, middle_->forward());
+  const double frames = 0.5 * (shutter_.open + shutter_.close),
+               cosine = dot(world.direction, middle_->forward());
   const bool isInside = prepare(motion_ ? motion_->toBody(world, frames) : world, SubSample{}, 0.0, out);
   out.cosine = float(cosine);
   if (!meet(world, cosine, isInside, out, hit)) return false;
@@ -622,8 +621,8 @@ void Picture::points(const PixelBox& box, Scratch& scratch) const {
   scratch.hits.resize(count);
   for (std::size_t i = 0; i != count; ++i) {
     Ray ray;
-    if (!centreRay(box.x0 + int(i % std::size_t(box.width())), box.y0 + int(i / std::size_t(box.width())), ray,
-                   scratch.rays[pixels.size()], scratch.hits[pixels.size()]))
+    if (!centreRay(box.x0 + int(i % std::size_t(box.width())), box.y0 + int(i / std::size_t(box.width())),
+                   ray, scratch.rays[pixels.size()], scratch.hits[pixels.size()]))
       continue;
     pixels.push_back(i);
     world.push_back(ray);
@@ -677,11 +676,14 @@ void Picture::points(const PixelBox& box, Scratch& scratch) const {
 bool Picture::meet(const Ray& world, double cosine, bool isInside, MarchRay& ray,
                    std::optional<Surfaces::Hit>& hit) const {
   hit.reset();
+  ray.isCut = false;
   if (!surfaces_) return isInside;
   hit = surfaces_->hit(world);
   if (!hit) return isInside;
   if (isInside && hit->distance > double(ray.start)) {
-    ray.length = std::min(ray.length, float(hit->distance - double(ray.start)));
+    const float end = float(hit->distance - double(ray.start));
+    ray.isCut = end < ray.length;
+    ray.length = std::min(ray.length, end);
     return true;
   }
   // A march of no length.
@@ -723,7 +725,8 @@ Vec3f Picture::lightOn(const Surfaces::Hit& hit, const Vec3d& place, std::size_t
   for (const LocalLight& light : lit_.lights.locals) {
     const Vec3d way = Vec3d(light.position) - start, towards = normalize(way);
     const float r = float(length(way));
-    if (r > 0) add(towards, r, light.intensity * (light.decayAt(r) * light.coneAt(-Vec3f(towards))), light.shadow);
+    if (r > 0)
+      add(towards, r, light.intensity * (light.decayAt(r) * light.coneAt(-Vec3f(towards))), light.shadow);
   }
   // The sky in directions as frequent as their cosines, which the samples of a pixel share out.
   const int count = std::max(4, kSkyRays / int(pattern_.size()));
@@ -752,8 +755,7 @@ float Picture::addSurface(const Surfaces::Hit& hit, const MarchRay& ray, const M
   std::size_t cursor = 0;
   const float depth = float(hit.distance) * ray.cosine, held = ray.holdout.transmittance(depth, cursor);
   Vec3f seen;
-  for (int c = 0; c != 3; ++c)
-    seen[c] = held * std::exp(-result.opticalDepth * scene_.extinctionColour[c]);
+  for (int c = 0; c != 3; ++c) seen[c] = held * std::exp(-result.opticalDepth * scene_.extinctionColour[c]);
   const float opacity = (seen.x + seen.y + seen.z) / 3;
   if (opacity <= scene_.cutoff) return 0;
   colour = seen * hit.colour * lightOn(hit, world.origin + world.direction * hit.distance, sample);
@@ -1028,8 +1030,7 @@ RenderResult renderImage(const RenderVolume& volume, const Medium& medium, const
   // First of all, since it refuses unknown layers.
   Film film(camera, lightNames(lights, options), options.aovs);
   const auto start = std::chrono::steady_clock::now();
-  const auto light =
-      bake(volume, medium, lights, options.octaves, nullptr, progress, options.surfaces.get());
+  const auto light = bake(volume, medium, lights, options.octaves, nullptr, progress, options.surfaces.get());
   require(light || !options.surfaces, "objects: need a volume that is not empty and has an extinction");
   const double lightSeconds = secondsSince(start);
   RenderResult result = look(light.get(), camera, options, film, progress);

@@ -12,10 +12,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "modeling/error.h"
+#include "render/environment.h"
 
 namespace nephele {
 namespace {
@@ -59,7 +61,7 @@ Lights Turntable::lights(const Lights& start, double frame) const {
   if (!lightsMove()) return start;
   const double degrees = (orbit_ == Orbit::model ? -1 : 1) * degreesAt(frame);
   Lights result = start;
-  require(!start.map, "turntable: a sky from a file stands still, and the lights of this orbit turn");
+  if (start.map) result.map = std::make_shared<const Environment>(start.map->turned(degrees));
   for (DistantLight& sun : result.suns) {
     requireNoMap(sun.name, sun.deepShadow != nullptr);
     sun.direction = turned(sun.direction, degrees);

@@ -13,8 +13,7 @@
 // Motion: a mean over lines through the velocity at their ends. It averages densities and not pictures, so
 // that what is opaque and moves far covers a little more than it should.
 //
-// Limits: a fine volume beside a large coarse one costs the fine voxels in both. Emission does not light the
-// volume around it.
+// Limits: a fine volume beside a large coarse one costs the fine voxels in both.
 #include "render/volume_parts.h"
 
 #include <fmt/format.h>

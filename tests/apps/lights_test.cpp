@@ -36,7 +36,7 @@ class LightOptions : public testing::Test {
     EXPECT_EQ(result.exitCode, 0) << result.errors;
     return readImage(data_->file("a.exr"));
   }
-  static std::string file(const std::string& name) { return "'" + data_->file(name) + "'"; }
+  static std::string file(const std::string& name) { return fmt::format("'{}'", data_->file(name)); }
 
   static TemporaryFolder* data_;
 };
@@ -77,7 +77,7 @@ TEST_F(LightOptions, SkyMapsAreSkies) {
 }
 
 TEST_F(LightOptions, DeepShadowsGoThroughFiles) {
-  const std::string light = "--sky 0,0,0 --octaves 1 --sun 90,38 ";
+  const std::string light = "--extinction 2 --sky 0,0,0 --octaves 1 --sun 90,38 ";
   const Image plain = picture(light);
   const Image deep = picture(light + "--shadows deep --write-deep-shadow " + file("shadow.exr"));
   const Image read = picture(light + "--read-deep-shadow sun=" + file("shadow.exr"));

@@ -69,10 +69,11 @@ void march(benchmark::State& state, March&& kernel) {
 }
 
 void marchVectors(benchmark::State& state) {
-  march(state, marchRays);
+  march(state, [](const auto& scene, const auto& rays, auto& results) { marchRays(scene, rays, results); });
 }
 void marchScalar(benchmark::State& state) {
-  march(state, marchRaysScalar);
+  march(state,
+        [](const auto& scene, const auto& rays, auto& results) { marchRaysScalar(scene, rays, results); });
 }
 BENCHMARK(marchVectors)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(marchScalar)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);

@@ -79,5 +79,61 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   }
 }
 
+TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
+  const auto grid = test::ball(1.0f, 0.1f);
+  const RenderVolume volume(grid);
+  const LightVolume light(volume, {0, 0, 1});
+  MarchScene scene;
+  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
+  scene.ranges = grid->ranges.data();
+  scene.emptiness = volume.emptiness().data();
+  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}});
+  scene.extinction = 1.5f;
+  scene.step = 0.05f;
+  const HoldoutCurve::Knot knots[] = {{8.5f, 0}, {9.0f, 0.4f}, {9.0f, 0.9f}, {9.3f, 1.0f}};
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != 40; ++i) {
+    MarchRay ray{};
+    const Vec3f origin{-0.9f + 0.045f * float(i), 0.1f, 2};
+    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, {0, 0, -1});
+    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, {0, 0, -1});
+    ray.start = 7;
+    ray.length = 4;
+    ray.weight[0][0][0] = 1;
+    if (i % 2 == 0) ray.holdout = {knots, std::size(knots)};
+    rays.push_back(ray);
+  }
+  std::vector<MarchResult> expected(rays.size());
+  marchRaysScalar(scene, rays, expected);
+  test::forEachTarget([&] {
+    std::vector<MarchResult> results(rays.size()), unrecorded(rays.size());
+    std::vector<MarchRecord> records(rays.size());
+    marchRays(scene, rays, results, records);
+    marchRays(scene, rays, unrecorded);
+    for (std::size_t i = 0; i != rays.size(); ++i) {
+      EXPECT_EQ(results[i].suns[0][0], unrecorded[i].suns[0][0]);
+      EXPECT_EQ(results[i].opticalDepth, unrecorded[i].opticalDepth);
+      EXPECT_NEAR(results[i].suns[0][0], expected[i].suns[0][0], 1e-5f);
+      const bool isHeld = i % 2 == 0;
+      const float opacity = isHeld ? results[i].heldOpacity[0] : 1 - std::exp(-results[i].opticalDepth);
+      if (isHeld) {
+        EXPECT_NEAR(opacity, expected[i].heldOpacity[0], 1e-5f);
+      }
+      if (std::isfinite(expected[i].distance)) {
+        EXPECT_NEAR(results[i].distance, expected[i].distance, 1e-4f);
+      }
+      // The record ends with what the result says, its steps one behind the other.
+      ASSERT_FALSE(records[i].marks.empty());
+      EXPECT_EQ(records[i].marks.back().result.suns[0][0], results[i].suns[0][0]);
+      EXPECT_EQ(records[i].marks.back().stepCount, records[i].steps.size());
+      EXPECT_NEAR(records[i].steps.empty() ? 0 : records[i].steps.back().opacity, opacity, 1e-5f);
+      for (std::size_t k = 1; k < records[i].steps.size(); ++k) {
+        EXPECT_GE(records[i].steps[k].begin, records[i].steps[k - 1].end - 1e-4f);
+        EXPECT_GE(records[i].steps[k].opacity, records[i].steps[k - 1].opacity);
+      }
+    }
+  });
+}
+
 }  // namespace
 }  // namespace nephele

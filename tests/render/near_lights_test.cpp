@@ -327,7 +327,7 @@ TEST(NearLights, GiveBlackWhereThereAreNone) {
 TEST(NearLights, RefuseWhatIsAbsurd) {
   const auto refused = [](const auto& change, const std::string& words) {
     Lights lights{{{}}, {}, {point({0, 1, 0})}};
-    lights.locals[0].cone.emplace();
+    lights.locals[0].cone = LocalLight::Cone{{0, -1, 0}, 25, 5};
     change(lights);
     try {
       lights.check();

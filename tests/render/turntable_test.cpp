@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "modeling/error.h"
+#include "render/environment.h"
 
 namespace nephele {
 namespace {
@@ -133,6 +134,22 @@ TEST(Turntable, AModelThatTurnsSeesCameraAndLightsTurnTheOtherWay) {
     EXPECT_EQ(lights.suns[sun].irradiance, turned.suns[sun].irradiance);
   }
   EXPECT_EQ(turned.sky, lights.sky);
+}
+
+TEST(Turntable, LightsThatTurnTakeTheMapOfTheSkyAlong) {
+  std::vector<Vec3f> radiance(32);
+  radiance[11] = {5, 4, 3};
+  Lights lights;
+  lights.map = std::make_shared<const Environment>(8, 4, radiance);
+  const Lights turned = Turntable(Orbit::light, kMiddle, 1, 8).lights(lights, 2);
+  ASSERT_NE(turned.map, nullptr);
+  // Frame 2 of 1 to 8 is turned by 45 degrees, one of the map's columns.
+  for (int azimuth = 7; azimuth < 360; azimuth += 15)
+    for (const int elevation : {-50, -10, 10, 50}) {
+      const auto a = float(azimuth), e = float(elevation);
+      EXPECT_EQ(turned.map->radiance(directionTowards(a + 45, e)),
+                lights.map->radiance(directionTowards(a, e)));
+    }
 }
 
 TEST(Turntable, LightsThatTurnLeaveTheCameraAlone) {

@@ -208,7 +208,10 @@ TEST(VolumeColour, WhatGlowsLightsTheVolumeAroundIt) {
   // A glowing core within a shell that only scatters, an optical depth of 8 across, against the path tracer;
   // the noise of 20000 paths is some 1 %. Where the eye sees the shell beside the core, all light is
   // scattered.
-  const auto shell = test::ball(1.0f, 0.1f), core = test::ball(0.4f, 0.1f);
+  const auto shell = test::ball(1.0f, 0.1f);
+  const auto core = densityGrid(voxels(0.1f), {-12, -12, -12}, {12, 12, 12}, [](const Vec3f& p) {
+    return std::fmin(1.0f, std::fmax(0.0f, (0.4f - length(p)) / 0.1f + 0.5f));
+  });
   const RenderVolume volume(shell, {{}, coloured(*core, {2, 1, 0.5f})});
   Medium its = medium(4.0f, 0.95f);
   its.phase = Phase::henyeyGreenstein(0.3f);
