@@ -31,7 +31,7 @@ test: deps
 test-farm: build
 	@dpkg -s $(FARM_PACKAGES) >/dev/null 2>&1 || \
 	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(FARM_PACKAGES)
-	$(SUDO) sh tests/farm/run.sh build/bin/nephele
+	$(SUDO) sh tests/render_farm/run.sh build/bin/nephele
 
 bench: deps
 	cmake --preset release -DNEPHELE_BUILD_TESTS=OFF -DNEPHELE_BUILD_BENCHMARKS=ON

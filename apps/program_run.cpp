@@ -21,6 +21,9 @@ volatile std::sig_atomic_t receivedSignal = 0;
 extern "C" void onStopSignal(int signal) {
   if (receivedSignal != 0) {
     discardAllOutputs();
+    // Only what signal handlers may call.
+    constexpr char message[] = "nephele: stopped at once; no partial output was left\n";
+    static_cast<void>(!write(STDERR_FILENO, message, sizeof(message) - 1));
     _exit(128 + signal);
   }
   receivedSignal = signal;

@@ -31,7 +31,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
   scene.ranges = grid->ranges.data();
   scene.emptiness = volume.emptiness().data();
-  scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
+  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}});
   // Three colours of the sun, of which green has none, and of the sky.
   scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
   scene.scatteredSize = {5, 4, 2};

@@ -134,7 +134,7 @@ cd "$folder"
 "$program" cloud "$data/cloud_base.obj" -o cloud.vdb --resolution 100 --quiet
 # Slow enough that a task can be met between its frames.
 job=$(NEPHELE="$program" sbatch --parsable --array=1-4 --cpus-per-task=1 --output="$folder/tasks/%a.log" \
-  "$data/farm/turntable.sbatch" cloud.vdb 'frames/cloud.####.exr' 1-8 --size 160x90 --samples 400)
+  "$data/render_farm/turntable.sbatch" cloud.vdb 'frames/cloud.####.exr' 1-8 --size 160x90 --samples 400)
 echo "farm: array job $job"
 
 finished() { ! squeue --noheader --jobs="$job" --states=all --format=%T | grep -qvE 'COMPLETED|FAILED'; }
