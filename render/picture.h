@@ -1,0 +1,81 @@
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "render/baked_light.h"
+#include "render/camera.h"
+#include "render/deep_image.h"
+#include "render/film.h"
+#include "render/march_kernels.h"
+#include "render/pixel_points.h"
+#include "render/raymarch.h"
+#include "render/sub_samples.h"
+
+namespace nephele::detail {
+
+/// One look at a lit volume.
+class Picture {
+ public:
+  /// What a thread needs to work on pixels.
+  struct Scratch {
+    explicit Scratch(const RenderOptions& options) : deep(options.deep.value_or(DeepOptions{})) {}
+
+    std::vector<MarchRay> rays;
+    std::vector<MarchResult> results;
+    std::vector<MarchRecord> records;
+    std::vector<std::optional<Surfaces::Hit>> hits;
+    // The camera's rays that met objects, and which of the pattern they are.
+    std::vector<std::pair<Ray, std::size_t>> seen;
+    PixelSum sum;
+    DeepPixel deep;
+    std::vector<DeepSample> samples;
+    std::vector<PixelPoint> points;
+  };
+
+  /// Keeps references to all of them.
+  Picture(const BakedLight& lit, const Camera& camera, const RenderOptions& options, const Film& film);
+
+  /// Marches the rays of a pixel into scratch.sum and, for deep pictures, scratch.samples; returns the
+  /// samples taken.
+  std::uint64_t pixel(int x, int y, Scratch& scratch) const;
+
+  /// What the centres of the pixels meet, row by row, into scratch.points.
+  void points(const PixelBox& box, Scratch& scratch) const;
+
+ private:
+  void preparePoints(const Film& film, const RenderOptions& options);
+  bool centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const;
+  Ray worldRay(int x, int y, const SubSample& sub) const;
+  bool meet(const Ray& world, double cosine, bool isInside, MarchRay& ray,
+            std::optional<Surfaces::Hit>& hit) const;
+  Vec3f through(const Vec3d& from, const Vec3d& towards, double distance, const Vec3f& shadow) const;
+  Vec3f lightOn(const Surfaces::Hit& hit, const Vec3d& place, std::size_t sample) const;
+  float addSurface(const Surfaces::Hit& hit, const MarchRay& ray, const MarchResult& result, const Ray& world,
+                   std::size_t sample, PixelSum& out, Vec3f& colour) const;
+  bool enter(const Ray& ray, MarchRay& out) const;
+  bool prepare(const Ray& ray, const SubSample& sub, double shift, MarchRay& out) const;
+  bool prepareBlurred(int x, int y, const SubSample& sub, double shift, MarchRay& out) const;
+
+  const BakedLight& lit_;
+  const Camera& camera_;
+  Shutter shutter_;
+  std::optional<RigidMotion> motion_;
+  bool blurred_;
+  std::vector<SubSample> pattern_;
+  MarchScene scene_;
+  bool isDeep_ = false;
+  const Holdout* holdout_ = nullptr;
+  const Surfaces* surfaces_ = nullptr;
+  MarchScene shadowScene_;
+  DeepPixel::Gains gains_;
+
+  // For the centres of pixels: the density alone, seen in the middle of the shutter.
+  MarchScene pointScene_;
+  std::optional<Camera> middle_;
+  std::optional<DensityNormals> normals_;
+  std::optional<PixelMotion> pixelMotion_;
+};
+
+}  // namespace nephele::detail
