@@ -51,6 +51,7 @@ struct Verb {
 
 Verb levelsetVerb();
 Verb cloudVerb();
+Verb advectVerb();
 Verb meshVerb();
 Verb renderVerb();
 Verb turntableVerb();

@@ -22,14 +22,13 @@ nlohmann::json layersOf(const Cloud& cloud) {
 }
 
 void growCloud(const CloudArguments& arguments, Run& run) {
-  run.begin("read");
-  const RepairedMesh shape = readShape(arguments.input, arguments.repair, run);
-  for (const std::string& repair : shape.repairs) run.note(repair);
-
-  const CloudOptions options = arguments.resolved(boundingBox(shape.mesh).longestSide());
-  run.requireMemory(estimatedCloudBytes(shape.mesh, options),
+  const Mesh shape = arguments.shape.shape(run);
+  const CloudOptions options = arguments.resolved(boundingBox(shape));
+  run.requireMemory(estimatedCloudBytes(shape, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
-  const Cloud cloud = makeCloud(shape.mesh, options, run);
+  Cloud cloud = makeCloud(shape, options, run);
+  cloud.density =
+      arguments.advection.carried(cloud.density, boundingBox(shape).longestSide(), arguments.seed, run);
   run.stats["layers"] = layersOf(cloud);
 
   run.begin("write");

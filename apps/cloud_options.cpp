@@ -2,7 +2,8 @@
 
 namespace nephele::apps {
 
-CloudOptions CloudArguments::resolved(double longestSide) const {
+CloudOptions CloudArguments::resolved(const Box& shapeBox) const {
+  const double longestSide = shapeBox.longestSide();
   CloudOptions result = cloud;
   result.voxelSize =
       float(voxelSize.value > 0 ? voxelSize.worldUnits(longestSide) : longestSide / resolution);
@@ -14,15 +15,15 @@ CloudOptions CloudArguments::resolved(double longestSide) const {
   result.layers.billowScale = float(billowScale);
   result.layers.seed = std::uint32_t(seed);
   result.edgeThickness = float(edgeThickness.worldUnits(longestSide));
+  result.edgeExponent = density.edgeExponent;
+  result.densityFactor = density.factor(shapeBox, shape.isGenerated(), result.layers.seed);
   result.withSurface = !surface.empty();
   return result;
 }
 
 void addCloudOptions(CLI::App& app, CloudArguments& a) {
   using Renormalise = CumuloGridOptions::Renormalise;
-  app.add_option("input", a.input, "Mesh, or level set (.vdb, .nvdb), to grow a cloud on.")
-      ->required()
-      ->type_name("FILE");
+  addShapeOptions(app, a.shape);
   addOutput(app, "-o,--output", a.output, {".vdb"}, "Volume to write; its grid is called 'density'.")
       ->required();
   addOutput(app, "--surface", a.surface, {".vdb"},
@@ -47,7 +48,8 @@ void addCloudOptions(CLI::App& app, CloudArguments& a) {
   addCount(app, "--medial-smoothing", a.cloud.medialSmoothing, 0, kMaxMedialSmoothing,
            "Voxels by which jumps between facing parts are smoothed.");
   addLength(app, "--edge-thickness", a.edgeThickness, "Width over which density rises to 1.", Sign::positive);
-  addRepair(app, a.repair.mode);
+  addDensityOptions(app, a.density);
+  addCloudAdvectionOptions(app, a.advection);
   addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another cloud of the same kind.");
   app.add_flag("--half", a.cloud.halfFloat, "Save 16-bit values.");
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 
@@ -13,6 +14,12 @@ namespace nephele::apps {
 namespace {
 
 using Numbers = std::vector<double>;
+
+// What ranges let through is a number, or none.
+float finite(const std::string& option, double x) {
+  if (!std::isfinite(x)) refuseValue(option, "nan", "a finite number");
+  return float(x);
+}
 
 // "key=1,2,3" as "key" and "1,2,3"; the name is empty if there is none.
 std::pair<std::string, std::string> named(const std::string& text) {
@@ -182,7 +189,8 @@ void addDeepShadows(CLI::App& app, LightOptions& options) {
       "Where shadows come from: sweeps through the volume, or deep shadow maps, whose light must see the "
       "volume within 75 degrees of its middle.");
   app.add_option_function<double>(
-         "--shadow-tolerance", [&options](double x) { options.deepTolerance = float(x); },
+         "--shadow-tolerance",
+         [&options](double x) { options.deepTolerance = finite("--shadow-tolerance", x); },
          "Largest error of the transmittance in deep shadow maps.")
       ->type_name("NUMBER")
       ->check(CLI::Range(1e-6, 0.5))
@@ -216,13 +224,14 @@ void addSky(CLI::App& app, LightOptions& options) {
       ->type_name("R,G,B|FILE")
       ->default_str(fmt::format("{:g},{:g},{:g}", sky.x, sky.y, sky.z));
   app.add_option_function<double>(
-         "--sky-rotation", [&options](double x) { options.sky.rotationDegrees = float(x); },
+         "--sky-rotation",
+         [&options](double x) { options.sky.rotationDegrees = finite("--sky-rotation", x); },
          "Turns the map about the vertical axis; azimuths grow by as much.")
       ->type_name("DEGREES")
       ->check(CLI::Range(-36000.0, 36000.0))
       ->default_str("0");
   app.add_option_function<double>(
-         "--sky-intensity", [&options](double x) { options.sky.intensity = float(x); },
+         "--sky-intensity", [&options](double x) { options.sky.intensity = finite("--sky-intensity", x); },
          "Multiplies the radiance of the map.")
       ->type_name("NUMBER")
       ->check(CLI::Range(0.0, 1e6))

@@ -8,5 +8,6 @@ int main(int argc, char** argv) {
   // stage.
   mallopt(M_MMAP_THRESHOLD, 1 << 17);
   return runProgram(argc, argv,
-                    {levelsetVerb(), cloudVerb(), meshVerb(), renderVerb(), turntableVerb(), infoVerb()});
+                    {levelsetVerb(), cloudVerb(), advectVerb(), meshVerb(), renderVerb(), turntableVerb(),
+                     infoVerb()});
 }

@@ -100,4 +100,10 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
   return all.empty() ? nullptr : std::make_shared<const Surfaces>(std::move(all));
 }
 
+void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume) const {
+  picture.render.surfaces = surfaces(volume);
+  if (picture.pathTraced && picture.render.surfaces)
+    refuseValue("--integrator", "path", "march, where there are objects");
+}
+
 }  // namespace nephele::apps

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/app.h"
+#include "apps/render_options.h"
 #include "render/render_volume.h"
 #include "render/surfaces.h"
 
@@ -24,6 +25,8 @@ struct ObjectOptions {
 
   /// Reads the files; null where there are no objects. @throws Error naming the file.
   std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume) const;
+  /// Puts them into `picture`. @throws Error as `surfaces`, CLI::Error if it is to be path traced.
+  void addTo(PictureOptions& picture, const RenderVolume& volume) const;
 };
 
 /// Declares the options on `app`.

@@ -44,10 +44,9 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
   if (picture.pathTraced && !(options.deep.empty() && options.holdout.empty()))
     refuseValue(options.deep.empty() ? "--holdout" : "--deep",
                 options.deep.empty() ? options.holdout : options.deep, "--integrator march");
-  picture.render.surfaces = options.objects.surfaces(volume);
-  if (picture.pathTraced && picture.render.surfaces)
-    refuseValue("--integrator", "path", "march, where there are objects");
+  options.objects.addTo(picture, volume);
   if (!options.deep.empty()) picture.render.deep.emplace();
+  if (options.deep == options.output) refuseValue("--deep", options.deep, "another file than --output");
   if (!options.holdout.empty())
     picture.render.holdout = readHoldout(options.holdout, camera, run.memoryLimitBytes);
 }
@@ -70,8 +69,10 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   auto metadata = run.metadata();
   metadata["seed"] = std::to_string(picture.render.seed);
   metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
-  writeExr(options.output, result.image, camera, metadata);
-  if (result.deep) writeDeepExr(options.deep, *result.deep, camera, metadata);
+  if (result.deep)
+    writeExrPair({options.output, options.deep}, result.image, *result.deep, camera, metadata);
+  else
+    writeExr(options.output, result.image, camera, metadata);
   if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
 
   run.stats["rays"] = result.rays;

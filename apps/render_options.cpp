@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 
 #include "render/film.h"
 
 namespace nephele::apps {
 namespace {
 
-constexpr double kAny = std::numeric_limits<double>::max();
+constexpr double kBrightest = 1e30;
 
 [[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& allowed) {
   throw CLI::ValidationError(option, fmt::format("got '{}', allowed: {}", text, allowed));
@@ -95,13 +95,17 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->check(CLI::IsMember(layers))
       ->default_str("Z");
   app.add_option_function<double>(
-         "--exposure", [&options](double stops) { options.screen.exposureStops = float(stops); },
+         "--exposure",
+         [&options](double stops) {
+           if (std::isnan(stops)) refuse("--exposure", "nan", "a number from -20 to 20");
+           options.screen.exposureStops = float(stops);
+         },
          "Of the preview, in stops.")
       ->type_name("STOPS")
       ->check(CLI::Range(-20.0, 20.0))
       ->default_str("0");
   addNumbers(
-      app, "--background", "R,G,B", 3, 0, kAny, [&options](const Vec3f& v) { options.background = v; },
+      app, "--background", "R,G,B", 3, 0, kBrightest, [&options](const Vec3f& v) { options.background = v; },
       "Linear colour behind the preview.")
       ->default_str("the sky's");
 }

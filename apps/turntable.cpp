@@ -36,6 +36,8 @@ void bindOptions(CLI::App& app, TurntableOptions& options) {
   app.add_option("--shard", options.shard, "Make the share of machine I of N (from 1): every N-th frame.")
       ->type_name("I/N");
   addPictureOptions(app, options.picture);
+  addObjectOptions(app, options.objects);
+  options.app = &app;
 }
 
 // The camera of the first frame, which frames all that any frame shows. The shutter and what it blurs come
@@ -62,14 +64,14 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   const RenderVolume volume =
       readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
-  const PictureOptions picture = options.picture.resolved(volume);
+  PictureOptions picture = options.picture.resolved(volume);
+  options.objects.addTo(picture, volume);
   const Camera start = firstCamera(options, picture, volume);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.
-  run.requireMemory(
-      double(volume.memoryBytes()) + (options.orbit == Orbit::camera ? 1 : 2) *
-                                         estimateRenderBytes(volume, picture.lights, start, picture.render),
-      "make the picture smaller (--size), or the volume with larger voxels");
+  const double bytes = estimateRenderBytes(volume, picture.lights, start, picture.render);
+  run.requireMemory(double(volume.memoryBytes()) + (options.orbit == Orbit::camera ? 1 : 2) * bytes,
+                    "make the picture smaller (--size), or the volume with larger voxels");
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
   if (options.skipExisting) skipExisting(plan, start, run);
 

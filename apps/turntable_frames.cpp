@@ -4,12 +4,15 @@
 // case. The movie and the sheet are made of the files in the end, so that they are the same whether frames
 // were made now or by an earlier call.
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <atomic>
 #include <chrono>
+#include <future>
 
 #include "apps/turntable_plan.h"
 #include "modeling/error.h"
+#include "render/backdrop.h"
 #include "render/contact_sheet.h"
 #include "render/exr_io.h"
 #include "render/png_io.h"
@@ -51,7 +54,8 @@ class FrameMaker {
              const Camera& start, const Progress& progress)
       : picture_(picture), volume_(volume), turntable_(turntable), start_(start) {
     if (!picture.pathTraced && !turntable.lightsMove())
-      light_.emplace(volume, picture.medium, picture.lights, picture.render.octaves, progress);
+      light_.emplace(volume, picture.medium, picture.lights, picture.render.octaves, progress,
+                     picture.render.surfaces);
     lightSeconds_ = light_ ? light_->lightSeconds() : 0;
   }
 
@@ -75,7 +79,8 @@ class FrameMaker {
     if (turntable_.lightsMove()) {
       const Lights lights = turntable_.lights(picture_.lights, frame);
       light_ = light_ ? light_->underOther(lights, progress)
-                      : LitVolume(volume_, picture_.medium, lights, picture_.render.octaves, progress);
+                      : LitVolume(volume_, picture_.medium, lights, picture_.render.octaves, progress,
+                                  picture_.render.surfaces);
       lightSeconds_ += light_->lightSeconds();
     }
     RenderOptions options = picture_.marched(camera);
@@ -92,6 +97,33 @@ class FrameMaker {
   const Camera& start_;
   std::optional<LitVolume> light_;
   double lightSeconds_ = 0;
+};
+
+// Writes a frame while the next one is made, where more than one thread may run.
+class FrameWriter {
+ public:
+  explicit FrameWriter(const ViewTransform& screen) : screen_(screen) {}
+
+  // Returns when the frame before is written. @throws Error if that failed.
+  void write(const TurntableFrame& frame, Image image, const Camera& camera,
+             std::map<std::string, std::string> metadata) {
+    finish();
+    auto task = [this, &frame, camera, image = std::move(image), metadata = std::move(metadata)] {
+      writeExr(frame.path, image, camera, metadata);
+      if (!frame.preview.empty()) writePng(frame.preview, image, screen_, metadata);
+    };
+    if (tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) == 1)
+      task();
+    else
+      written_ = std::async(std::launch::async, std::move(task));
+  }
+  void finish() {
+    if (written_.valid()) written_.get();
+  }
+
+ private:
+  const ViewTransform& screen_;
+  std::future<void> written_;
 };
 
 std::map<std::string, std::string> metadataOf(const PictureOptions& picture, const Run& run, int frame) {
@@ -116,6 +148,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   }
   double marchSeconds = 0;
   std::uint64_t rays = 0, samples = 0;
+  FrameWriter writer(picture.screen);
   std::optional<FrameMaker> maker;
   if (!missing.empty()) maker.emplace(picture, volume, turntable, start, run);
   run.expect(0.05, options.movie.empty() && options.contactSheet.empty() ? 1.0 : 0.95);
@@ -125,18 +158,22 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       const auto began = std::chrono::steady_clock::now();
       const FrameProgress progress(run, i, missing.size());
       const Camera camera = maker->camera(frame.number);
-      const RenderResult result = maker->make(frame.number, camera, progress);
+      RenderResult result = maker->make(frame.number, camera, progress);
+      if (options.objects.backdrop)
+        addBackdrop(result.image, camera, turntable.lights(picture.lights, frame.number));
       // Also where a frame has no work that would ask.
       run.check();
-      const auto metadata = metadataOf(picture, run, frame.number);
-      writeExr(frame.path, result.image, camera, metadata);
-      if (!frame.preview.empty()) writePng(frame.preview, result.image, picture.screen, metadata);
+      auto metadata = metadataOf(picture, run, frame.number);
+      metadata[TurntablePlan::kDigestName] = plan.digest;
+      writer.write(frame, std::move(result.image), camera, std::move(metadata));
+      if (i + 1 == missing.size()) writer.finish();
       frame.seconds = secondsSince(began);
       marchSeconds += result.marchSeconds;
       rays += result.rays;
       samples += result.samples;
       run.advance(double(i + 1) / double(missing.size()));
     } catch (const Cancelled&) {
+      writer.finish();
       run.note(fmt::format("stopped after {} of {} frames; the same call with --skip-existing makes the rest",
                            i, missing.size()));
       throw;

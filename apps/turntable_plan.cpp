@@ -3,13 +3,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
+#include <fstream>
 
 #include "levelset/output_file.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
 #include "render/exr_io.h"
+#include "render/image_file.h"
 
 namespace nephele::apps {
 namespace {
@@ -35,16 +39,73 @@ std::vector<int> shardOf(const FrameRange& range, const std::string& text) {
   return range.shard(index, count);
 }
 
-// Why `path` is not a whole picture of the `window` of `camera`; "" if it is.
-std::string defect(const std::string& path, const PixelBox& window) {
+// A 64 bit FNV-1a hash.
+class Hash {
+ public:
+  void add(std::string_view bytes) {
+    for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
+    // So that "ab", "c" and "a", "bc" differ.
+    value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
+  }
+  // A file by what it holds, wherever it is.
+  void addFile(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::vector<char> block(std::size_t(1) << 20);
+    while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
+      add({block.data(), std::size_t(file.gcount())});
+  }
+  std::string text() const { return fmt::format("{:016x}", value_); }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+// What the pixels of a frame do not depend on, or only by its number.
+constexpr std::array kOthers{"output",        "frames",     "preview",      "movie",    "fps",
+                             "contact-sheet", "only",       "shard",        "exposure", "config",
+                             "skip-existing", "background", "threads",      "quiet",    "verbose",
+                             "stats",         "progress",   "memory-limit", "help",     "overwrite"};
+
+std::string digestOf(const TurntableOptions& options, int first, int last) {
+  Hash hash;
+  hash.add(NEPHELE_VERSION);
+  hash.add(fmt::format("{}-{}", first, last));
+  for (const CLI::Option* option : options.app->get_options()) {
+    const std::string name = option->get_single_name();
+    if (option->count() == 0 || std::ranges::count(kOthers, name) > 0) continue;
+    hash.add(name);
+    for (const std::string& value : option->results()) {
+      std::error_code ignored;
+      const std::size_t equals = value.find('=');
+      const std::string rest = equals == std::string::npos ? value : value.substr(equals + 1);
+      const bool isFile = std::filesystem::is_regular_file(rest, ignored);
+      hash.add(isFile ? value.substr(0, value.size() - rest.size()) : value);
+      if (isFile) hash.addFile(rest);
+    }
+  }
+  return hash.text();
+}
+
+// Why `path` is not a whole picture of the `window` of `camera`; "" if it is. Pictures for the screen say
+// nothing of what they are made of.
+std::string defect(const std::string& path, const PixelBox& window, const std::string& digest) {
   try {
+    std::string found;
+    if (!digest.empty()) {
+      const detail::ImageReader reader{[&](const detail::ImageHeader& header) {
+                                         for (const auto& [name, value] : header.attributes)
+                                           if (name == TurntablePlan::kDigestName) found = value;
+                                       },
+                                       [](int, const float*) {}};
+      detail::readExrFile(path, reader);
+    }
     const Image image = readImage(path);
     for (const char* name : {"R", "G", "B"})
       if (!image.find(name)) return fmt::format("has no channel {}", name);
     if (image.width != window.width() || image.height != window.height())
       return fmt::format("is {}x{} and not {}x{}", image.width, image.height, window.width(),
                          window.height());
-    return {};
+    return found == digest ? "" : "was made with other options, of another input or by another version";
   } catch (const Error& error) {
     return fmt::format("is not whole ({})", error.what());
   }
@@ -56,6 +117,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
+  digest = digestOf(options, first, last);
   const FramePattern output = parsed("--output", [&] { return FramePattern::parse(options.output); });
   std::optional<FramePattern> preview;
   if (!options.preview.empty())
@@ -101,14 +163,14 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run) {
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
           TurntableFrame& frame = plan.frames[i];
-          const auto isWhole = [&](const std::string& path) {
+          const auto isWhole = [&](const std::string& path, const std::string& digest) {
             if (path.empty() || !std::filesystem::exists(path)) return false;
-            const std::string what = defect(path, camera.window());
+            const std::string what = defect(path, camera.window(), digest);
             if (!what.empty()) run.note(fmt::format("{}: {}; it is made again", path, what));
             return what.empty();
           };
-          frame.skipped = isWhole(frame.path);
-          frame.previewSkipped = frame.skipped && isWhole(frame.preview);
+          frame.skipped = isWhole(frame.path, plan.digest);
+          frame.previewSkipped = frame.skipped && isWhole(frame.preview, "");
         }
       },
       run);

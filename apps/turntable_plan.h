@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/object_options.h"
 #include "apps/render_options.h"
 #include "render/frame_range.h"
 #include "render/movie.h"
@@ -19,7 +20,10 @@ struct TurntableOptions {
   double turns = 1;
   bool skipExisting = false;
   MovieWriter::Options movieOptions;
+  ObjectOptions objects;
   PictureOptions picture;
+  /// What these were read from.
+  const CLI::App* app = nullptr;
 };
 
 /// One frame of a turntable.
@@ -38,6 +42,11 @@ struct TurntablePlan {
   /// First and last of the whole turntable, of which `frames` may be a part.
   int first = 0, last = 0;
   std::vector<TurntableFrame> frames;
+  /// Says what frames are made of: the options that their pixels depend on, as typed, the contents of the
+  /// files that these name, first and last, and the version of the program. The attribute kDigestName of the
+  /// frames.
+  std::string digest;
+  static constexpr const char* kDigestName = "nephele:options";
 
   /// @throws CLI::ValidationError naming the option that is wrong.
   explicit TurntablePlan(const TurntableOptions& options);
@@ -47,8 +56,8 @@ struct TurntablePlan {
 /// @throws Error naming the path.
 void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan);
 
-/// Marks as skipped what is there, is whole (readable to its last row) and is a picture of `camera`'s size;
-/// notes what is there and is not.
+/// Marks as skipped what is there, is whole (readable to its last row), is a picture of `camera`'s size and
+/// was made with the same options; notes what is there and is not.
 void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run);
 
 /// Makes the frames that are not skipped, one after another, each on all threads: frames side by side would

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "levelset/vdb_io.h"
 #include "render/volume_parts.h"
 
@@ -13,6 +16,8 @@ template <class Body>
 void naming(const std::string& path, Body&& body) {
   try {
     body();
+  } catch (const Cancelled&) {
+    throw;
   } catch (const Error& error) {
     if (std::string_view(error.what()).starts_with(path)) throw;
     throw Error(fmt::format("{}: {}", path, error.what()));
@@ -152,7 +157,10 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   for (std::size_t i = 0; i != paths.size(); ++i)
     naming(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
   run.requireMemory(estimateCombinedBytes(parts), "make the volumes with larger voxels");
-  return combine(parts, run);
+  if (paths.size() > 1) return combine(parts, run);
+  std::optional<RenderVolume> only;
+  naming(paths.front(), [&] { only.emplace(combine(parts, run)); });
+  return *std::move(only);
 }
 
 }  // namespace nephele::apps

@@ -2,6 +2,8 @@
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(hwy REQUIRED)
+find_path(FFTW3_INCLUDE_DIR fftw3.h REQUIRED)
+find_library(FFTW3F_LIBRARY fftw3f REQUIRED)
 find_package(CGAL REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(Imath REQUIRED)

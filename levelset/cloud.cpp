@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "levelset/grid_field.h"
 #include "levelset/marching_cubes.h"
 #include "levelset/mesh_distance.h"
 #include "levelset/mesh_io.h"
@@ -36,7 +37,32 @@ float baseVoxelSize(const std::vector<CumuloLayer>& layers, float voxelSize) {
   return std::max(voxelSize, cumuloVoxelSize(layers, layers.size() - 1, voxelSize));
 }
 
+/// The share of the box, in level slices, in which `factor` is not one number, so that voxels are stored.
+double varyingShare(const ScalarField& factor, const Box& box) {
+  constexpr int kSlices = 32;
+  int varying = 0;
+  for (int i = 0; i < kSlices; ++i) {
+    Box slice = box;
+    slice.min.y = box.min.y + box.size().y * float(i) / kSlices;
+    slice.max.y = box.min.y + box.size().y * float(i + 1) / kSlices;
+    varying += !factor.range(slice).isPoint();
+  }
+  return double(varying) / kSlices;
+}
+
 }  // namespace
+
+Mesh cloudShapeMesh(const CloudShapeOptions& options, const Progress& progress) {
+  // Fine enough that facets are lost beside the first layer of bumps on any cloud.
+  constexpr float kVoxels = 96;
+  const CloudShape shape = cloudShape(options);
+  const float voxel = options.size / kVoxels;
+  return marchingCubes(
+      *bakeGrid(shape.level,
+                {.voxelSize = voxel, .box = shape.box.expanded(2 * voxel), .band = {-2 * voxel, 2 * voxel}},
+                progress),
+      0.0f, progress);
+}
 
 RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
   return repairMesh(isVolumeFile(path) ? surfaceOfLevelSet(path, progress) : readMesh(path), repair,
@@ -47,16 +73,18 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
   require(options.voxelSize > 0,
           "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   const std::vector<CumuloLayer> layers = cumuloLayers(options.layers);
+  const float edge = options.edgeThickness / 2;
   progress.begin("distance");
   const ScalarField base = meshDistance(mesh,
                                         {.voxelSize = baseVoxelSize(layers, options.voxelSize),
-                                         .exteriorBand = cumuloExteriorBand(layers, options.voxelSize),
-                                         .interiorBand = cumuloInteriorBand(layers, options.voxelSize)},
+                                         .exteriorBand = cumuloExteriorBand(layers, options.voxelSize, edge),
+                                         .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)},
                                         progress);
   GriddedCumulo cumulo = griddedCumulo(base, layers,
                                        {.voxelSize = options.voxelSize,
                                         .box = boundingBox(mesh),
                                         .newtonSteps = options.newtonSteps,
+                                        .edge = edge,
                                         .closestPoint = closestPoint(mesh),
                                         .medialSmoothing = options.medialSmoothing,
                                         .renormalise = options.renormalise},
@@ -64,6 +92,8 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
   Cloud cloud{cloudDensity(cumulo,
                            {.voxelSize = options.voxelSize,
                             .edgeThickness = options.edgeThickness,
+                            .edgeExponent = options.edgeExponent,
+                            .factor = options.densityFactor,
                             .halfFloat = options.halfFloat},
                            progress),
               {},
@@ -82,9 +112,12 @@ double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
   const double area = surfaceArea(mesh), voxel = options.voxelSize;
   const double baseVoxel = baseVoxelSize(layers, options.voxelSize);
   const double grids = options.withSurface ? 2 : 1;
+  const double varying =
+      std::abs(signedVolume(mesh)) * varyingShare(options.densityFactor, boundingBox(mesh));
   return estimatedCumuloBytes(layers, options.voxelSize, area * kGrowth) +
          sizeof(float) * area *
-             (kBaseVoxels / (baseVoxel * baseVoxel) + kResultVoxels * grids / (voxel * voxel));
+             (kBaseVoxels / (baseVoxel * baseVoxel) + kResultVoxels * grids / (voxel * voxel)) +
+         sizeof(float) * kGrowth * varying / (voxel * voxel * voxel);
 }
 
 }  // namespace nephele

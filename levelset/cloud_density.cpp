@@ -37,11 +37,12 @@ constexpr int kLevelSetHalfWidth = 3;
 /// What a value of l becomes in the file.
 class DensityRule {
  public:
-  explicit DensityRule(float edge) : edge_(edge) {}
+  DensityRule(float edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
   /// Values of l at and beyond whose ends the file's value does not change.
   Interval band() const { return {-edge_ / 2, edge_ / 2}; }
   float operator()(float l) const {
     const float t = std::clamp(l / edge_ + 0.5f, 0.0f, 1.0f);
+    if (exponent_) return *exponent_ == 1 ? t : std::pow(t, *exponent_);
     return t * t * (3 - 2 * t);
   }
   bool isActive(float value) const { return value > 0; }
@@ -49,6 +50,7 @@ class DensityRule {
 
  private:
   float edge_;
+  std::optional<float> exponent_;
 };
 
 class LevelSetRule {
@@ -65,15 +67,19 @@ class LevelSetRule {
 
 /// What one block of the octree came to.
 struct Block {
+  struct Tile {
+    openvdb::Coord origin;
+    float value;
+  };
   std::vector<std::unique_ptr<Leaf>> leaves;
-  std::vector<openvdb::Coord> insideTiles;
+  std::vector<Tile> tiles;
 };
 
 template <class Rule>
 class TreeBuilder {
  public:
-  TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule)
-      : cloud_(cloud), voxel_(voxelSize), rule_(rule), settled_(rule.band()) {
+  TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor)
+      : cloud_(cloud), voxel_(voxelSize), rule_(rule), factor_(factor), settled_(rule.band()) {
     settled_.min -= cloud.estimateError;
     settled_.max += cloud.estimateError;
   }
@@ -91,7 +97,9 @@ class TreeBuilder {
       parallelFor(slab.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b) {
           progress.check();
-          split((corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock, kBlock, estimate, slab[b]);
+          const Vec3i block = (corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock;
+          split(block, kBlock, {estimate, factor_.restrictedTo(boxOfVoxels(block, {kBlock, kBlock, kBlock}))},
+                slab[b]);
         }
       });
       move(slab, *tree);
@@ -117,23 +125,34 @@ class TreeBuilder {
                                   .band = {settled_.min - margin, settled_.max + margin}});
   }
 
-  void split(const Vec3i& first, int width, const ScalarField& estimate, Block& block) const {
-    const Interval l = estimate.range(boxOfVoxels(first, {width, width, width}));
+  /// What blocks are read from.
+  struct Source {
+    ScalarField estimate, factor;
+  };
+
+  void split(const Vec3i& first, int width, const Source& source, Block& block) const {
+    const Box box = boxOfVoxels(first, {width, width, width});
+    const Interval l = source.estimate.range(box);
     if (l.max <= settled_.min) return;
-    if (l.min >= settled_.max) {
+    const Interval factor = source.factor.range(box);
+    if (factor == Interval::of(0)) return;
+    if (l.min >= settled_.max && factor.isPoint()) {
       for (int z = 0; z < width; z += kLeaf)
         for (int y = 0; y < width; y += kLeaf)
           for (int x = 0; x < width; x += kLeaf)
-            block.insideTiles.emplace_back(first.x + x, first.y + y, first.z + z);
+            block.tiles.push_back({{first.x + x, first.y + y, first.z + z}, insideValue() * factor.min});
       return;
     }
-    if (width == kLeaf) return evaluate(first, estimate, block);
+    if (width == kLeaf) return evaluate(first, source, l.min >= settled_.max, factor, block);
     const int half = width / 2;
     for (int i = 0; i < 8; ++i)
-      split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, estimate, block);
+      split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, source, block);
   }
 
-  void evaluate(const Vec3i& first, const ScalarField& estimate, Block& block) const {
+  float insideValue() const { return rule_(rule_.band().max); }
+
+  void evaluate(const Vec3i& first, const Source& source, bool whole, const Interval& factorRange,
+                Block& block) const {
     constexpr int kCount = int(Leaf::SIZE);
     std::array<float, kCount> x, y, z, l;
     for (int i = 0; i < kCount; ++i) {
@@ -142,7 +161,10 @@ class TreeBuilder {
       y[i] = float(first.y + (i >> 3 & 7)) * voxel_;
       z[i] = float(first.z + (i & 7)) * voxel_;
     }
-    estimate.eval({x, y, z}, std::span<float>(l));
+    if (whole)
+      l.fill(settled_.max);
+    else
+      source.estimate.eval({x, y, z}, std::span<float>(l));
 
     std::array<float, kCount> nearX, nearY, nearZ, exact;
     std::array<int, kCount> place;
@@ -166,11 +188,16 @@ class TreeBuilder {
       outside &= value <= rule_.band().min;
     }
     const openvdb::Coord origin(first.x, first.y, first.z);
-    if (inside) block.insideTiles.push_back(origin);
-    if (inside || outside) return;
+    if (inside && factorRange.isPoint()) block.tiles.push_back({origin, insideValue() * factorRange.min});
+    if ((inside && factorRange.isPoint()) || outside) return;
+    std::array<float, kCount> factor;
+    if (factorRange.isPoint())
+      factor.fill(factorRange.min);
+    else
+      source.factor.eval({x, y, z}, std::span<float>(factor));
     auto leaf = std::make_unique<Leaf>(origin, rule_.background(), false);
     for (int i = 0; i < kCount; ++i) {
-      const float value = rule_(l[i]);
+      const float value = rule_(l[i]) * factor[i];
       leaf->buffer().setValue(openvdb::Index(i), value);
       leaf->setActiveState(openvdb::Index(i), rule_.isActive(value));
     }
@@ -180,10 +207,9 @@ class TreeBuilder {
   /// Puts what `blocks` hold into `tree` and empties them.
   void move(std::vector<Block>& blocks, openvdb::FloatTree& tree) const {
     openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor(tree);
-    const float inside = rule_(rule_.band().max);
     for (Block& block : blocks) {
-      for (const openvdb::Coord& origin : block.insideTiles)
-        accessor.addTile(1, origin, inside, rule_.isActive(inside));
+      for (const Block::Tile& tile : block.tiles)
+        accessor.addTile(1, tile.origin, tile.value, rule_.isActive(tile.value));
       for (std::unique_ptr<Leaf>& leaf : block.leaves) accessor.addLeaf(leaf.release());
       block = {};
     }
@@ -192,15 +218,16 @@ class TreeBuilder {
   const GriddedCumulo& cloud_;
   float voxel_;
   Rule rule_;
+  ScalarField factor_;
   Interval settled_;
 };
 
 template <class Rule>
-VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const VdbGridLabel& label,
-                  const Progress& progress) {
+VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor,
+                  const VdbGridLabel& label, const Progress& progress) {
   detail::initializeOpenVdb();
   detail::releaseFreed();
-  auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule).build(progress));
+  auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule, factor).build(progress));
   grid->setName(label.name);
   grid->setGridClass(label.gridClass == VdbGridInfo::Class::levelSet ? openvdb::GRID_LEVEL_SET
                                                                      : openvdb::GRID_FOG_VOLUME);
@@ -217,15 +244,20 @@ VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& opti
           "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(options.edgeThickness > 0,
           "cloudDensity: edgeThickness must be > 0, got " + std::to_string(options.edgeThickness));
+  require(!options.edgeExponent || (*options.edgeExponent > 0 && std::isfinite(*options.edgeExponent)),
+          "cloudDensity: edgeExponent must be > 0, got " + std::to_string(options.edgeExponent.value_or(0)));
+  const Interval factor = options.factor.range(cloud.box);
+  require(factor.min >= 0,
+          "cloudDensity: the factor must not be negative, got values from " + std::to_string(factor.min));
   progress.begin("density");
-  return buildGrid(cloud, options.voxelSize, DensityRule(options.edgeThickness),
-                   {"density", VdbGridInfo::Class::fogVolume, options.halfFloat}, progress);
+  return buildGrid(cloud, options.voxelSize, DensityRule(options.edgeThickness, options.edgeExponent),
+                   options.factor, {"density", VdbGridInfo::Class::fogVolume, options.halfFloat}, progress);
 }
 
 VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat, const Progress& progress) {
   require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
   progress.begin("surface");
-  return buildGrid(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize),
+  return buildGrid(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize), 1.0f,
                    {"surface", VdbGridInfo::Class::levelSet, halfFloat}, progress);
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "levelset/cumulo_grids.h"
 #include "levelset/vdb_io.h"
 
@@ -11,16 +13,23 @@ struct CloudDensityOptions {
   /// Width in world units, > 0, over which the density rises from 0 to 1, half of it to either side of the
   /// surface.
   float edgeThickness = 0.0f;
+  /// How the density rises over the edge: t^edgeExponent, t from 0 to 1 over its width; 1 is linear, more is
+  /// a thinner rim. > 0. Empty: t t (3 - 2 t).
+  std::optional<float> edgeExponent{};
+  /// Multiplies the density; nowhere negative. See modeling/density_profile.h.
+  ScalarField factor{1.0f};
   bool halfFloat = false;
 };
 
 /// The cloud as fog: grid `density`, class fog volume, background 0.
 ///
-/// The value is smoothstep(-edge / 2, edge / 2, l): 1 inside, 0 outside, 1/2 on the surface. l is not a
-/// distance but grows faster than one, so the edge is as thick as stated or thinner, at any voxel size. Inner
-/// bricks are tiles. Cost grows with the bricks that the edge crosses. All cores; the same bits at any thread
-/// count.
-/// @throws Error if a length is not > 0; Cancelled.
+/// The value is smoothstep(-edge / 2, edge / 2, l): 1 inside, 0 outside, 1/2 on the surface; or the power of
+/// t that the options ask for; times the factor. l is not a distance but grows faster than one, so the edge
+/// is as thick as stated or thinner, at any voxel size; an edge thicker than 6 voxels needs
+/// CumuloGridOptions::edge. Inner bricks are tiles where the factor's range is a single value. Cost grows
+/// with the bricks that the edge crosses and those in which the factor varies. All cores; the same bits at
+/// any thread count.
+/// @throws Error if a length or the exponent is not > 0, or the factor can be negative; Cancelled.
 VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
                      const Progress& progress = silent());
 

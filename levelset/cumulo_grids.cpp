@@ -52,8 +52,10 @@ constexpr std::size_t kSearchedBricks = 128;
 constexpr int kPartBricks = 8;
 constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
 
-float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize) {
-  return kMarginVoxels * cumuloVoxelSize(layers, index, voxelSize);
+/// Width kept on either side of the band of a layer. Displacement ends at three quarters of it.
+float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, const CumuloGridOptions& options) {
+  const float voxel = cumuloVoxelSize(layers, index, options.voxelSize);
+  return std::max(kMarginVoxels * voxel, options.edge * 4 / 3 + voxel);
 }
 
 float coarsestVoxel(const std::vector<CumuloLayer>& layers, float voxelSize) {
@@ -215,7 +217,7 @@ class LayerSampler {
       estimateVoxelSize = voxel;
       return;
     }
-    const float margin = marginOf(layers_, step.index + 1, options_.voxelSize);
+    const float margin = marginOf(layers_, step.index + 1, options_);
     const float further = step.reach - step.bound;
     BakeOptions spec{.voxelSize = voxel,
                      .box = options_.box.expanded(reach_ + margin),
@@ -354,12 +356,13 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
   return std::min(wave / kFewestSamplesPerWave, std::max(aimed, resultVoxelSize));
 }
 
-float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize) {
-  return displacementBound(layers) + 6 * coarsestVoxel(layers, voxelSize);
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
+  return displacementBound(layers) + cumuloInteriorBand(layers, voxelSize, edge);
 }
 
-float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize) {
-  return 6 * coarsestVoxel(layers, voxelSize);
+float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
+  const float voxel = coarsestVoxel(layers, voxelSize);
+  return std::max(6 * voxel, edge * 4 / 3 + 3 * voxel);
 }
 
 double estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float voxelSize, double area) {
@@ -382,6 +385,8 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
   require(options.medialSmoothing >= 0 && options.medialSmoothing <= kMaxMedialSmoothing,
           "griddedCumulo: medialSmoothing must be 0 to " + std::to_string(kMaxMedialSmoothing) + ", got " +
               std::to_string(options.medialSmoothing));
+  require(options.edge >= 0 && std::isfinite(options.edge),
+          "griddedCumulo: edge must be >= 0 and finite, got " + std::to_string(options.edge));
   require(!layers.empty(), "griddedCumulo: there must be at least one layer");
 
   LayerSampler sampler(layers, options, progress);
@@ -389,7 +394,7 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
                      .newtonSteps = options.newtonSteps,
                      .closestPoint = options.closestPoint};
   form.bake = [&](const CumuloStep& step) { return sampler(step); };
-  form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options.voxelSize); };
+  form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options); };
   GriddedCumulo result;
   result.surface = cumulo(base, layers, form);
   result.estimate = sampler.estimate;

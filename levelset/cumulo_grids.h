@@ -24,6 +24,9 @@ struct CumuloGridOptions {
   Box box{};
   /// Newton steps towards the surface.
   int newtonSteps = 5;
+  /// Half width of the edge, world units: as far as this from the surface, on either side, the result is the
+  /// full sum. It always is within 3 voxels.
+  float edge = 0.0f;
   /// See CumuloOptions::closestPoint.
   std::optional<VectorField> closestPoint{};
   /// Voxels by which the places where displacement jumps over the medial axis grow before they are smoothed,
@@ -69,8 +72,8 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
 
 /// Exterior band (world units) in which the base must be a distance for `layers`; the interior one is
 /// `cumuloInteriorBand`. They cover the displacement, the coarsest grid's interpolation and the Newton steps.
-float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize);
-float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize);
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f);
+float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f);
 
 /// Memory that `griddedCumulo` needs for a base surface of `area` (world units squared), bytes; for refusing
 /// early.

@@ -113,6 +113,15 @@ void OutputFile::commit() {
   strike(entry_);
 }
 
+void commitTogether(std::span<OutputFile* const> outputs) {
+  for (std::size_t i = 0; i != outputs.size(); ++i) try {
+      outputs[i]->commit();
+    } catch (const Error&) {
+      for (OutputFile* before : outputs.first(i)) ::unlink(before->path().c_str());
+      throw;
+    }
+}
+
 void discardAllOutputs() noexcept {
   for (OpenTemporary* node = openTemporaries.load(); node; node = node->next) {
     State expected = State::open;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 namespace nephele {
@@ -20,6 +21,8 @@ class OutputFile {
   /// Where to write; has the same extension as the target.
   const std::string& temporaryPath() const { return temporary_; }
 
+  const std::string& path() const { return path_; }
+
   /// Renames the temporary to the target. @throws Error naming the path.
   void commit();
 
@@ -29,6 +32,10 @@ class OutputFile {
   void* entry_ = nullptr;  // where discardAllOutputs finds the temporary
   bool committed_ = false;
 };
+
+/// Commits all, in this order: files that mean something only together. Where one cannot be renamed, those
+/// renamed before it are removed. @throws Error naming the path.
+void commitTogether(std::span<OutputFile* const> outputs);
 
 /// Unlinks every temporary that is open now. Safe to call from a signal handler.
 void discardAllOutputs() noexcept;

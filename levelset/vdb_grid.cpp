@@ -47,6 +47,8 @@ std::string displayName(const openvdb::GridBase& grid) {
 class TreeTable {
  public:
   TreeTable(const FloatTree& tree, const std::string& name) : background_(tree.background()) {
+    require(std::isfinite(background_),
+            fmt::format("grid {} has a background of {}, which must be finite", name, background_));
     constants_.push_back(background_);
     collect(tree);
     if (empty()) return;

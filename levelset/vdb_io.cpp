@@ -124,19 +124,20 @@ VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
   failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
 }
 
+std::array<VdbGrid, 3> vectorComponents(const VdbGrid& handle) {
+  const openvdb::GridBase::Ptr& grid = handle.impl().grid;
+  if (grid->isType<openvdb::Vec3SGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
+  if (grid->isType<openvdb::Vec3DGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
+  throw Error(fmt::format("grid '{}' holds {} values; a grid of vectors is needed", grid->getName(),
+                          grid->valueType()));
+}
+
 std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name) {
   const auto grids =
       readGrids(path, [&](const auto&, const std::string& gridName) { return gridName == name; });
   for (const auto& grid : grids) {
     if (grid->getName() != name) continue;
-    return translateReadErrors(path, [&]() -> std::array<VdbGrid, 3> {
-      if (grid->isType<openvdb::Vec3SGrid>())
-        return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
-      if (grid->isType<openvdb::Vec3DGrid>())
-        return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
-      failReading(path, fmt::format("grid '{}' holds {} values; a grid of vectors is needed", name,
-                                    grid->valueType()));
-    });
+    return translateReadErrors(path, [&] { return vectorComponents(detail::wrapGrid(grid)); });
   }
   failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
 }

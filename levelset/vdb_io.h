@@ -61,6 +61,9 @@ VdbGrid readScalarGrid(const std::string& path, const std::string& name = {});
 /// @throws Error naming the path, the name and the grids that are there.
 std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name);
 
+/// The same of a vector grid that was read already. @throws Error naming the grid if it holds no vectors.
+std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid);
+
 /// Bricks of a scalar grid. A level set changes sign (positive inside); fog keeps its values.
 std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid);
 

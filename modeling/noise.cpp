@@ -12,33 +12,15 @@
 
 #include "modeling/error.h"
 #include "modeling/field_ops.h"
+#include "modeling/noise_draw.h"
 #include "modeling/noise_kernels.h"
 #include "modeling/space.h"
 
 namespace nephele {
 namespace {
 
-/// How far from the identity a rotation times its transpose may be.
-constexpr float kNotOrthogonal = 1e-3f;
-
-/// A sequence of numbers that follow from a seed (PCG-style mixing of a counter).
-class Draw {
- public:
-  explicit Draw(std::uint32_t seed) : state_(seed * 0x9e3779b97f4a7c15ull + 0xd1b54a32d192ed03ull) {}
-
-  std::uint32_t bits() {
-    state_ += 0x9e3779b97f4a7c15ull;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return std::uint32_t(z >> 32);
-  }
-  /// Uniform in [0, 1).
-  float uniform() { return float(bits() >> 8) * 0x1p-24f; }
-
- private:
-  std::uint64_t state_;
-};
+using detail::Draw;
+using detail::kNotOrthogonal;
 
 /// A rotation, all equally likely: a random unit quaternion (Shoemake).
 Mat3f randomRotation(Draw& draw) {
@@ -101,25 +83,13 @@ void requireFractal(const FractalSumOptions& o) {
           "fractalSum: frequency times lacunarity^(octaves - 1) must be finite");
 }
 
-/// The sum of octave(i, frequency_i) with fractal amplitudes and unit rms.
-template <class Octave>
-ScalarField sumOctaves(const FractalSumOptions& o, const Octave& octave) {
-  double squares = 0;
-  for (int i = 0; i < o.octaves; ++i) squares += std::pow(double(o.roughness), 2 * i);
-  std::optional<ScalarField> sum;
-  for (int i = 0; i < o.octaves; ++i) {
-    const float amplitude = float(std::pow(double(o.roughness), i) / std::sqrt(squares));
-    const ScalarField term = octave(i, float(o.frequency * std::pow(double(o.lacunarity), i))) * amplitude;
-    sum = sum ? *sum + term : term;
-  }
-  return *sum;
-}
-
 }  // namespace
 
-ScalarField perlin(const PerlinOptions& options) {
+namespace detail {
+
+PerlinLattice drawnLattice(const PerlinOptions& options, const std::string& caller) {
   require(options.frequency > 0 && std::isfinite(options.frequency),
-          "perlin: frequency must be > 0 and finite, got " + std::to_string(options.frequency));
+          caller + ": frequency must be > 0 and finite, got " + std::to_string(options.frequency));
   Draw draw(options.seed);
   // Always drawn, so that giving one of the two does not change the other.
   const Mat3f drawnRotation = randomRotation(draw);
@@ -130,24 +100,41 @@ ScalarField perlin(const PerlinOptions& options) {
   const Mat3f square = toLattice * transpose(toLattice);
   for (int i = 0; i < 9; ++i)
     require(std::abs(square.m[i] - Mat3f::identity().m[i]) <= kNotOrthogonal,
-            "perlin: rotation must be orthogonal");
+            caller + ": rotation must be orthogonal");
   for (float& m : toLattice.m) m *= options.frequency;
-  require(isFinite(offset), "perlin: offset must be finite");
+  require(isFinite(offset), caller + ": offset must be finite");
+  return {toLattice, offset, draw.bits()};
+}
+
+ScalarField sumOctaves(const FractalSumOptions& o, const std::function<ScalarField(float)>& octave) {
+  requireFractal(o);
+  double squares = 0;
+  for (int i = 0; i < o.octaves; ++i) squares += std::pow(double(o.roughness), 2 * i);
+  std::optional<ScalarField> sum;
+  for (int i = 0; i < o.octaves; ++i) {
+    const float amplitude = float(std::pow(double(o.roughness), i) / std::sqrt(squares));
+    const ScalarField term = octave(float(o.frequency * std::pow(double(o.lacunarity), i))) * amplitude;
+    sum = sum ? *sum + term : term;
+  }
+  return *sum;
+}
+
+}  // namespace detail
+
+ScalarField perlin(const PerlinOptions& options) {
   return ScalarField(
-      std::make_shared<PerlinNode>(detail::PerlinLattice{toLattice, offset, draw.bits()}, options.frequency));
+      std::make_shared<PerlinNode>(detail::drawnLattice(options, "perlin"), options.frequency));
 }
 
 ScalarField fractalSum(const FractalSumOptions& options) {
-  requireFractal(options);
   Draw draw(options.seed);
-  return sumOctaves(
-      options, [&](int, float frequency) { return perlin({.frequency = frequency, .seed = draw.bits()}); });
+  return detail::sumOctaves(
+      options, [&](float frequency) { return perlin({.frequency = frequency, .seed = draw.bits()}); });
 }
 
 ScalarField fractalSum(const ScalarField& noise, const FractalSumOptions& options) {
-  requireFractal(options);
   Draw draw(options.seed);
-  return sumOctaves(options, [&](int, float frequency) {
+  return detail::sumOctaves(options, [&](float frequency) {
     Mat3f toNoise = randomRotation(draw);
     for (float& m : toNoise.m) m *= frequency;
     // The same noise is read again: far enough away not to be correlated.

@@ -6,19 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "render/deep_shadow.h"
-#include "render/sub_samples.h"
 
 namespace nephele::detail {
-
-namespace {
-
-// Optical depth of a full shadow.
-constexpr float kDark = 40.0f;
-
-}  // namespace
 
 BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
                        const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
@@ -33,6 +24,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   scene.density = {grid.values.data(), grid.table.data(), grid.brickCount};
   scene.ranges = grid.ranges.data();
   scene.emptiness = volume.emptiness().data();
+  scene.uniformity = volume.uniformity().data();
   // The scene's extinction is that of the most opaque colour.
   const float most =
       std::max({medium.extinctionColour.x, medium.extinctionColour.y, medium.extinctionColour.z});
@@ -45,12 +37,13 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   const Vec3f corner(grid.firstBrick * BrickGrid::kBrick);
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
+  const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
   suns.reserve(distant.size());
   for (const DistantLight& sun : distant) {
     progress.begin("light " + sun.name);
     LightVolume& light = suns.emplace_back(volume, sun.direction, progress);
     shadowDeeply(volume, sun, light, progress);
-    if (surfaces && surfaces->castsShadows()) darken(light, normalize(Vec3d(sun.direction)), *surfaces);
+    if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
     scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()},
                           {sun.shadow.x, sun.shadow.y, sun.shadow.z}});
     toSun.emplace_back(light.worldToLattice(), light.firstBrick());
@@ -59,23 +52,21 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   locals.reserve(lights.locals.size());
   for (const LocalLight& light : lights.locals) {
     progress.begin("light " + light.name);
-    shadowDeeply(volume, light, locals.emplace_back(volume, light, progress), progress);
+    ProjectedLightVolume& shadows = locals.emplace_back(volume, light, progress);
+    shadowDeeply(volume, light, shadows, progress);
+    if (surfaces && surfaces->castsShadows()) shadows.addShade(toShade, columnPerDepth(light.shadow));
   }
   scatter(volume, before, progress);
   for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
 }
 
-// Lays the shadows of objects into a light volume: at every node the share of the sun that is hidden from
-// the points a quarter of a voxel around it, so that edges are as soft as the lattice can show them.
-void BakedLight::darken(LightVolume& light, const Vec3d& towards, const Surfaces& surfaces) const {
-  light.add([&](const Vec3f& world) {
-    int hidden = 0;
-    for (const Vec3f& corner : kQuarterCorners)
-      hidden += surfaces.occluded({Vec3d(world + corner * voxelSize), towards},
-                                  std::numeric_limits<double>::infinity());
-    if (hidden == 0) return 0.0f;
-    return (hidden == 4 ? kDark : -std::log(1 - 0.25f * float(hidden))) / scene.extinction;
-  });
+// The column of an optical depth of 1 in the colour that a light's shadow is least opaque in; a light whose
+// shadow lets a colour through is not stopped by objects in it either.
+float BakedLight::columnPerDepth(const Vec3f& shadow) const {
+  float least = 1;
+  for (int c = 0; c != 3; ++c)
+    if (const float share = shadow[c] * scene.extinctionColour[c]; share > 0) least = std::min(least, share);
+  return 1 / (scene.extinction * std::max(least, 0.01f));
 }
 
 // Fills the columns of a light from its deep shadow map, if it has one.

@@ -61,7 +61,7 @@ struct BakedLight {
   Vec3f meanAlbedo;
 
  private:
-  void darken(LightVolume& light, const Vec3d& towards, const Surfaces& surfaces) const;
+  float columnPerDepth(const Vec3f& shadow) const;
   template <class Light, class Columns>
   void shadowDeeply(const RenderVolume& volume, const Light& light, Columns& columns,
                     const Progress& progress) const;

@@ -12,17 +12,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "levelset/output_file.h"
 #include "modeling/error.h"
 #include "render/deep_image.h"
 #include "render/exr_header.h"
+#include "render/exr_io.h"
 #include "render/image_file.h"
 
 namespace nephele {
 
 void writeDeepExr(const std::string& path, const DeepImage& image, const Camera& camera,
+                  const std::map<std::string, std::string>& metadata) {
+  OutputFile output(path);
+  writeDeepExr(output, image, camera, metadata);
+  output.commit();
+}
+
+void writeDeepExr(const OutputFile& output, const DeepImage& image, const Camera& camera,
                   const std::map<std::string, std::string>& metadata) {
   require(image.width > 0 && image.height > 0, "deep exr: the image is empty");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
@@ -39,7 +48,6 @@ void writeDeepExr(const std::string& path, const DeepImage& image, const Camera&
   for (const char* name : {"Z", "ZBack"}) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
   for (const char* name : {"A", "R", "G", "B"}) header.channels().insert(name, Imf::Channel(Imf::HALF));
 
-  OutputFile output(path);
   try {
     Imf::DeepScanLineOutputFile file(output.temporaryPath().c_str(), header);
     const auto width = std::size_t(image.width);
@@ -79,9 +87,16 @@ void writeDeepExr(const std::string& path, const DeepImage& image, const Camera&
       file.writePixels(1);
     }
   } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be written: {}", path, error.what()));
+    throw Error(fmt::format("{}: cannot be written: {}", output.path(), error.what()));
   }
-  output.commit();
+}
+
+void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const Camera& camera,
+                  const std::map<std::string, std::string>& metadata) {
+  OutputFile flatFile(paths.flat), deepFile(paths.deep);
+  writeDeepExr(deepFile, deep, camera, metadata);
+  writeExr(flatFile, flat, camera, metadata);
+  commitTogether(std::array{&deepFile, &flatFile});
 }
 
 DeepImage readDeepExr(const std::string& path, double mostBytes) {

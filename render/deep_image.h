@@ -11,6 +11,8 @@
 
 namespace nephele {
 
+class OutputFile;
+
 /// One piece of what lies behind a pixel: from depth z to zBack along the line of sight, with the opacity and
 /// the premultiplied colour that it has by itself. Both are spread over it as in a homogeneous medium.
 struct DeepSample {
@@ -93,6 +95,17 @@ FlatPixel flattened(const std::vector<DeepSample>& samples);
 /// writeExr, but the metadata `version` is called `softwareVersion`. Written beside `path` and renamed.
 /// @throws Error naming the path.
 void writeDeepExr(const std::string& path, const DeepImage& image, const Camera& camera,
+                  const std::map<std::string, std::string>& metadata = {});
+/// Writes a picture and its deep form, so that neither is there without the other. @throws Error naming the
+/// path of what could not be written; then neither is.
+struct ExrPair {
+  std::string flat, deep;
+};
+void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const Camera& camera,
+                  const std::map<std::string, std::string>& metadata = {});
+
+/// As the other, into `output`, which the caller commits.
+void writeDeepExr(const OutputFile& output, const DeepImage& image, const Camera& camera,
                   const std::map<std::string, std::string>& metadata = {});
 
 /// Reads a deep OpenEXR file made of scan lines, its first part: Z and A are needed, ZBack is Z and colours

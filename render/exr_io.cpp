@@ -124,6 +124,13 @@ Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::
 
 void writeExr(const std::string& path, const Image& image, const Camera& camera,
               const std::map<std::string, std::string>& metadata) {
+  OutputFile output(path);
+  writeExr(output, image, camera, metadata);
+  output.commit();
+}
+
+void writeExr(const OutputFile& output, const Image& image, const Camera& camera,
+              const std::map<std::string, std::string>& metadata) {
   require(image.width > 0 && image.height > 0 && !image.channels.empty(), "exr: the image is empty");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
   Imf::Header header = detail::exrHeader(image.width, image.height, image.display, camera, metadata);
@@ -144,15 +151,13 @@ void writeExr(const std::string& path, const Image& image, const Camera& camera,
                                                   pitch * sizeof(float)));
     }
   }
-  OutputFile output(path);
   try {
     Imf::OutputFile file(output.temporaryPath().c_str(), header);
     file.setFrameBuffer(frame);
     file.writePixels(image.height);
   } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be written: {}", path, error.what()));
+    throw Error(fmt::format("{}: cannot be written: {}", output.path(), error.what()));
   }
-  output.commit();
 }
 
 void detail::readExrFile(const std::string& path, const ImageReader& reader) {

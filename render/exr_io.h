@@ -9,6 +9,8 @@
 
 namespace nephele {
 
+class OutputFile;
+
 /// Writes an OpenEXR file, ZIP compressed: channels as 16 or 32 bit floats as they say, linear Rec. 709.
 ///
 /// Carries `chromaticities`, the camera's `worldToCamera` and `worldToNDC` (see Camera; for row vectors) and
@@ -17,6 +19,10 @@ namespace nephele {
 /// are clamped to it. Written beside `path` and renamed.
 /// @throws Error naming the path; no partial file stays.
 void writeExr(const std::string& path, const Image& image, const Camera& camera,
+              const std::map<std::string, std::string>& metadata = {});
+
+/// Likewise into `output`, which the caller commits.
+void writeExr(const OutputFile& output, const Image& image, const Camera& camera,
               const std::map<std::string, std::string>& metadata = {});
 
 /// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1. The pixels

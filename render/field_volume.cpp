@@ -19,6 +19,8 @@
 #include "levelset/grid_field.h"
 #include "modeling/error.h"
 #include "modeling/field_ops.h"
+#include "modeling/space.h"
+#include "render/field_density.h"
 
 namespace nephele {
 
@@ -130,6 +132,23 @@ RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const
   baking.box = options.box;
   baking.background = 0.0f;
   return RenderVolume(bakeGrid(max(density, 0.0f), baking, progress));
+}
+
+RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
+                            const Progress& progress) {
+  auto field = std::make_shared<const FieldDensity>(density, box, voxelSize, progress);
+  const ScalarField positive = max(density, 0.0f);
+  ScalarField mean(0.0f);
+  for (int corner = 0; corner != 8; ++corner) {
+    const Vec3f way{corner & 1 ? 0.25f : -0.25f, corner & 2 ? 0.25f : -0.25f, corner & 4 ? 0.25f : -0.25f};
+    mean = mean + translate(positive, way * voxelSize);
+  }
+  progress.begin("field");
+  BakeOptions baking;
+  baking.voxelSize = voxelSize;
+  baking.box = box;
+  baking.background = 0.0f;
+  return RenderVolume::ofField(bakeGrid(mean * 0.125f, baking, progress), std::move(field));
 }
 
 }  // namespace nephele

@@ -36,4 +36,18 @@ float fieldVoxelSize(const ScalarField& density, const Camera& camera, const Fie
 RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
                          const Progress& progress = silent());
 
+/// A density that rays ask the field for: no grid is between it and the picture, and detail is as fine as the
+/// picture asks for, see FieldDensity and Refinement. Values below zero count as zero; outside of the box
+/// there is none.
+///
+/// Only the light is worked out on a grid, whose voxels of `voxelSize` (world units) hold the mean of 8
+/// places in each: shadows are as soft as that. Where nothing else is known, `fieldVoxelSize` for some 2
+/// pixels per voxel is a good choice. Pictures, deep ones and layers come from the field, normals and what
+/// falls on objects from the grid; the path tracer and combined volumes take grids only. Cost: 8 evaluations
+/// per voxel and ranges of the voxels wherever the density varies.
+/// @throws Error as FieldDensity and bakeGrid do, or if the grid finds nothing of a field that may not be
+/// empty; Cancelled.
+RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
+                            const Progress& progress = silent());
+
 }  // namespace nephele

@@ -3,17 +3,22 @@
 // The lattice is the density's own, sheared: with w the index axis that the light is closest to, a node (i,
 // j, k) stands at index position (i + s k, j + t k, k), s and t being the light's slopes against w. Its third
 // axis then runs exactly along the light, its slices k coincide with the density's, and all nodes of a slice
-// lie at the same place within their voxels: a density sample is a bilinear mix with constant weights, and
-// the integral a running sum down each column. That works for every affine map from index to
+// lie at the same place within their voxels: a density sample is a mix with constant weights, and the
+// integral a running sum down each column, by Simpson's rule. That works for every affine map from index to
 // world space, and slopes are at most 1, so cells stay well shaped.
 //
 // Only bricks of the lattice that a brick with density reaches into are stored. Between them nothing is
 // added, so a column jumps from one to the next. Neighbouring bricks repeat the nodes they share, computed by
 // the same sums.
 //
-// Between nodes c is interpolated linearly, which overestimates a curved c by its second difference times f
-// (1 - f) / 2, f being the place in the cell: on average by 1/12 of it. Nodes hold c less that average, so
-// that the surface of an opaque cloud, where c curves most, is not too dark.
+// Between nodes c is interpolated linearly, which overestimates it where it is curved; nodes hold c less the
+// mean of that over a cell, so that the surface of an opaque cloud, where c curves most, is not too dark.
+// Across the light, c is a sum over slices of densities that are linear between voxels: nodes at the place f
+// between them overestimate the mean of a slice by f (1 - f) / 2 times its second difference, which the
+// weights of the mix take off. Along the light, a cell overestimates by 1/12 of its step times what the
+// density grows by in it. A node takes the mean of the two cells beside it, weighted by the density that they
+// hold, since nothing is seen in an empty one, and a third more: at an edge, where cells differ, a mean
+// leaves the first cell a third of its error.
 //
 // Limits: the column is resolved at the density's own spacing; structure finer than a voxel does not exist
 // there.
@@ -26,21 +31,27 @@
 #include "levelset/large_buffer.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
+#include "render/sub_samples.h"
 
 namespace nephele {
 
 namespace {
 
-constexpr int kN = LightVolume::kWidth + 2;  // nodes across a brick, one more on every side for differences
-constexpr int kPatch = kN + 3;  // density samples around a brick's slice, half a slice up and down
-constexpr int kPitch = 16;      // floats per row of a patch
-constexpr int kRow = 12;        // of which are worked on, a multiple of 4
-constexpr int kArea = kN * kPitch;
+constexpr int kN = LightVolume::kWidth;  // nodes across a brick
+constexpr int kPatch = kN + 5;           // density samples around a brick's slice, half a slice up and down
+constexpr int kPitch = 16;               // floats per row of a patch
+constexpr int kRow = 12;                 // floats per row of nodes, a multiple of 4
+constexpr int kArea = kN * kRow;
 
 }  // namespace
 
-/// Values at the nodes of a brick's slice, and one more on every side.
+/// Values at the nodes of a brick's slice.
 struct LightVolume::Nodes : std::array<float, kArea> {};
+
+/// Densities at a slice and the ones before and behind it on the light's way, and what lies between them.
+struct LightVolume::Slices {
+  alignas(64) Nodes previous{}, density{}, next{}, before{}, after{};
+};
 
 /// Density samples of a plane, the first of which stands at (u, v).
 struct LightVolume::Patch {
@@ -82,11 +93,11 @@ struct LightVolume::Sweep {
     return b;
   }
 
-  // The samples of the plane w = k that the nodes (u0 .. u0 + 10, v0 .. v0 + 10) need, from half a slice
+  // The samples of the plane w = k that the nodes (u0 .. u0 + 8, v0 .. v0 + 8) need, from half a slice
   // before to half a slice behind it. False if all are zero.
   bool load(int u0, int v0, int k, Patch& patch) const {
-    patch.u = u0 + int(std::floor(slopeU * float(k))) - 1;
-    patch.v = v0 + int(std::floor(slopeV * float(k))) - 1;
+    patch.u = u0 + int(std::floor(slopeU * float(k))) - 2;
+    patch.v = v0 + int(std::floor(slopeV * float(k))) - 2;
     patch.empty = true;
     constexpr int size = BrickGrid::kBrick;
     const int bw = brickOf(k);
@@ -112,6 +123,13 @@ struct LightVolume::Sweep {
     return !patch.empty;
   }
 
+  // What four samples in a row count for at the place f between the middle two: linear interpolation, less
+  // what it overestimates on average, f (1 - f) / 2 times the second difference.
+  static std::array<float, 4> weights(float f) {
+    const float g = 1 - f, most = 0.5f * f * g;
+    return {-most * g, g + most * (2 * g - f), f + most * (2 * f - g), -most * f};
+  }
+
   // Densities where the nodes from (u0, v0) on pass w, at most half a slice from the patch.
   void interpolate(const Patch& patch, int u0, int v0, float atW, Nodes& out) const {
     if (patch.empty) {
@@ -120,16 +138,20 @@ struct LightVolume::Sweep {
     }
     const float shiftU = slopeU * atW, shiftV = slopeV * atW;
     const float floorU = std::floor(shiftU), floorV = std::floor(shiftV);
-    const float fu = shiftU - floorU, fv = shiftV - floorV;
-    const float w00 = (1 - fu) * (1 - fv), w10 = fu * (1 - fv), w01 = (1 - fu) * fv, w11 = fu * fv;
+    const std::array<float, 4> atU = weights(shiftU - floorU), atV = weights(shiftV - floorV);
     const float* first =
-        patch.samples.data() + (v0 + int(floorV) - patch.v) * kPitch + (u0 + int(floorU) - patch.u);
-    for (int j = 0; j != kN; ++j) {
-      const float *a = first + j * kPitch, *b = a + kPitch;
-      float* row = out.data() + j * kPitch;
-      // The whole pitch, so that rows are a round number of vectors; the patch has room behind its last row.
-      for (int i = 0; i != kRow; ++i) row[i] = w00 * a[i] + w10 * a[i + 1] + w01 * b[i] + w11 * b[i + 1];
+        patch.samples.data() + (v0 + int(floorV) - 1 - patch.v) * kPitch + (u0 + int(floorU) - 1 - patch.u);
+    alignas(64) float rows[(kN + 3) * kRow];
+    for (int j = 0; j != kN + 3; ++j) {
+      const float* a = first + j * kPitch;
+      float* row = rows + j * kRow;
+      // The whole row, so that it is a round number of vectors; the patch has room behind its last one.
+      for (int i = 0; i != kRow; ++i)
+        row[i] = (atU[0] * a[i] + atU[1] * a[i + 1]) + (atU[2] * a[i + 2] + atU[3] * a[i + 3]);
     }
+    for (int i = 0; i != kArea; ++i)
+      out[std::size_t(i)] = (atV[0] * rows[i] + atV[1] * rows[i + kRow]) +
+                            (atV[2] * rows[i + 2 * kRow] + atV[3] * rows[i + 3 * kRow]);
   }
 };
 
@@ -161,7 +183,7 @@ void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
   const auto reach = [&](const Vec3i& brick, int axis, float slope, int& first, int& last) {
     const float a = -slope * float(brick[sweep.w] * kBrick);
     const float b = -slope * float((brick[sweep.w] + 1) * kBrick);
-    // A node more, for the differences there, and a little for the rounding of look-ups.
+    // A node more, for interpolation beyond the last voxel, and a little for the rounding of look-ups.
     constexpr float slack = 1.01f;
     first = int(std::floor((float(brick[axis] * kBrick) + std::min(a, b) - slack) / kBrick));
     last = int(std::floor((float((brick[axis] + 1) * kBrick) + std::max(a, b) + slack) / kBrick));
@@ -194,13 +216,14 @@ void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
 // Sums the density down one column of bricks, from the light on.
 void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
   const std::size_t across = std::size_t(brickCount_.x) * brickCount_.y;
-  const int u0 = (firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick - 1;
-  const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick - 1;
+  const int u0 = (firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick;
+  const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick;
   const int down = sweep.fromAbove ? -1 : 1;
   const auto poolAt = [&](int n) {
     return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
   };
-  alignas(64) Nodes sum{}, before{}, after{}, density{}, nextDensity{}, halfHere{}, halfNext{};
+  alignas(64) Nodes sum{}, halfHere{}, halfNext{};
+  Slices at;
   Patch here, next;
   for (int n = 0; n != brickCount_.z;) {
     if (!poolAt(n)) {
@@ -212,31 +235,33 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
     // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
     const int slices = (end - n) * kBrick;
     int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
-    before.fill(0.0f);
+    at.before.fill(0.0f);
+    at.previous.fill(0.0f);
     sweep.load(u0, v0, k, here);
-    sweep.interpolate(here, u0, v0, float(k), density);
+    sweep.interpolate(here, u0, v0, float(k), at.density);
     for (int slice = 0; slice <= slices; ++slice, k += down) {
-      // What the way to the next slice adds: trapezoids over half slices.
-      after.fill(0.0f);
+      // What the way to the next slice adds.
+      at.after.fill(0.0f);
+      at.next.fill(0.0f);
       if (slice < slices) {
         sweep.load(u0, v0, k + down, next);
         if (!here.empty || !next.empty) {
-          const float middle = float(k) + 0.5f * float(down), quarter = 0.25f * sweep.step;
+          const float middle = float(k) + 0.5f * float(down);
+          const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
           sweep.interpolate(here, u0, v0, middle, halfHere);
           sweep.interpolate(next, u0, v0, middle, halfNext);
-          sweep.interpolate(next, u0, v0, float(k + down), nextDensity);
+          sweep.interpolate(next, u0, v0, float(k + down), at.next);
           for (std::size_t m = 0; m != kArea; ++m)
-            after[m] = quarter * ((density[m] + nextDensity[m]) + (halfHere[m] + halfNext[m]));
-          std::swap(density, nextDensity);
-        } else {
-          density.fill(0.0f);
+            at.after[m] = end1 * (at.density[m] + at.next[m]) + middle1 * (halfHere[m] + halfNext[m]);
         }
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
-      if (slice < slices) store(sweep, poolAt(brick), inside, sum, before, after);
-      if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, before, after);
-      for (std::size_t m = 0; m != kArea; ++m) sum[m] += after[m];
-      std::swap(before, after);
+      if (slice < slices) store(sweep, poolAt(brick), inside, sum, at);
+      if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, at);
+      for (std::size_t m = 0; m != kArea; ++m) sum[m] += at.after[m];
+      std::swap(at.before, at.after);
+      std::swap(at.previous, at.density);
+      std::swap(at.density, at.next);
       std::swap(here, next);
     }
     n = end;
@@ -244,32 +269,71 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
 }
 
 // Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of
-// interpolation. `before` and `after` are what the slices beside it differ by.
+// interpolation along the light.
 void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum,
-                        const Nodes& before, const Nodes& after) {
+                        const Slices& at) {
   const int slice = sweep.fromAbove ? kBrick - inside : inside;
   float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
+  const float share = sweep.step * (4.0f / 3) / 12;
   for (int j = 0; j != kWidth; ++j)
     for (int i = 0; i != kWidth; ++i) {
-      const std::size_t at = std::size_t((j + 1) * kPitch + i + 1);
-      const float across = sum[at - 1] + sum[at + 1] + sum[at - kPitch] + sum[at + kPitch] - 4 * sum[at];
-      out[j * kWidth + i] = sum[at] - (across + after[at] - before[at]) / 12;
+      const std::size_t m = std::size_t(j * kRow + i);
+      const float before = std::max(at.before[m], 0.0f), after = std::max(at.after[m], 0.0f);
+      const float growth = before * (at.density[m] - at.previous[m]) + after * (at.next[m] - at.density[m]);
+      out[j * kWidth + i] = sum[m] - share * growth / std::max(before + after, 1e-30f);
     }
 }
 
-void LightVolume::add(const std::function<float(const Vec3f& world)>& column) {
+void detail::ColumnShade::addTo(float* values, int slice, float perDepth) const {
+  // By how many of the four points are hidden.
+  const float added[5] = {0, 0.28768207f * perDepth, 0.69314718f * perDepth, 1.38629436f * perDepth,
+                          kDark * perDepth};
+  const float sign = falls ? -1.0f : 1.0f;
+  for (int k = 0; k != LightVolume::kWidth; ++k)
+    for (const std::array<float, 4>& from : begins) {
+      int hidden = 0;
+      for (std::size_t p = 0; p != 4; ++p)
+        hidden += sign * (float(slice + k) + kQuarterCorners[p].z) > from[p];
+      *values++ += added[hidden];
+    }
+}
+
+void LightVolume::addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
+                           const Vec3f& towards, float perDepth) {
+  if (table_.empty() || box.isEmpty()) return;
   const Affine toWorld = inverse(worldToLattice_);
-  parallelFor(table_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t entry = begin; entry != end; ++entry) {
-      if (table_[entry] == 0) continue;
-      const Vec3i brick{int(entry % std::size_t(brickCount_.x)),
-                        int(entry / std::size_t(brickCount_.x) % std::size_t(brickCount_.y)),
-                        int(entry / std::size_t(brickCount_.x) / std::size_t(brickCount_.y))};
-      const Vec3i first = (firstBrick_ + brick) * kBrick;
-      float* values = values_.data() + std::size_t(table_[entry]) * kVolume;
-      for (int z = 0; z != kWidth; ++z)
-        for (int y = 0; y != kWidth; ++y)
-          for (int x = 0; x != kWidth; ++x) *values++ += column(toWorld(Vec3f(first + Vec3i{x, y, z})));
+  const Vec3f slice = toWorld.linear * Vec3f{0, 0, 1};
+  Box reach;
+  for (int corner = 0; corner != 8; ++corner)
+    reach = reach.including(
+        worldToLattice_({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                         corner & 4 ? box.max.z : box.min.z}));
+  const bool falls = dot(slice, towards) > 0;
+  const float start = falls ? reach.max.z + 1 : reach.min.z - 1, sign = falls ? -1.0f : 1.0f;
+  const Vec3d way = Vec3d(slice) * double(sign);
+  const double perSlice = length(way);
+  const std::size_t across = std::size_t(brickCount_.x) * std::size_t(brickCount_.y);
+  parallelFor(across, 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column != end; ++column) {
+      const Vec3i node = (firstBrick_ + Vec3i{int(column % std::size_t(brickCount_.x)),
+                                              int(column / std::size_t(brickCount_.x)), 0}) *
+                         kBrick;
+      constexpr float margin = 1;
+      if (float(node.x) - margin > reach.max.x || float(node.x + kBrick) + margin < reach.min.x ||
+          float(node.y) - margin > reach.max.y || float(node.y + kBrick) + margin < reach.min.y)
+        continue;
+      detail::ColumnShade shade;
+      shade.falls = falls;
+      for (std::size_t m = 0; m != shade.begins.size(); ++m)
+        for (std::size_t p = 0; p != 4; ++p) {
+          const Vec3f at{float(node.x + int(m) % kWidth) + kQuarterCorners[p].x,
+                         float(node.y + int(m) / kWidth) + kQuarterCorners[p].y, start};
+          const double distance = distanceToShade({Vec3d(toWorld(at)), way * (1 / perSlice)});
+          shade.begins[m][p] = sign * start + float(distance / perSlice);
+        }
+      for (std::size_t n = 0; n != std::size_t(brickCount_.z); ++n)
+        if (const std::int32_t pool = table_[n * across + column])
+          shade.addTo(values_.data() + std::size_t(pool) * kVolume, node.z + int(n) * kBrick, perDepth);
     }
   });
 }

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "modeling/progress.h"
+#include "render/camera.h"
 #include "render/render_volume.h"
 
 namespace nephele {
@@ -40,9 +43,12 @@ class LightVolume {
   /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells.
   const std::vector<float>& values() const { return values_; }
 
-  /// Adds column(world) to c at every node that is kept, for what stands in the light beside the density.
-  /// `column` is called from many threads.
-  void add(const std::function<float(const Vec3f& world)>& column);
+  /// Adds the shadow of opaque things within `box` to c: where a ray from the light, which starts outside of
+  /// the box and travels against `towards`, has met one after distanceToShade(ray), infinite if it meets
+  /// none. Edges are a voxel wide: four rays per column of nodes, a quarter of a node apart. Full shadow adds
+  /// detail::kDark times `perDepth`, the column of an optical depth of 1. Uses all cores.
+  void addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
+                const Vec3f& towards, float perDepth);
 
   /// c at a world-space point. Slow; for tests.
   float columnDensity(const Vec3f& world) const;
@@ -56,12 +62,12 @@ class LightVolume {
  private:
   struct Sweep;
   struct Nodes;
+  struct Slices;
   struct Patch;
 
   void findBricks(const RenderVolume& volume, const Sweep& sweep);
   void fillColumn(const Sweep& sweep, std::size_t column);
-  void store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum, const Nodes& before,
-             const Nodes& after);
+  void store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum, const Slices& at);
 
   Affine worldToLattice_;
   Vec3i firstBrick_, brickCount_;
@@ -70,6 +76,22 @@ class LightVolume {
 };
 
 namespace detail {
+/// Optical depth of a full shadow.
+inline constexpr float kDark = 40.0f;
+
+/// Where shadow begins along the node columns of a column of bricks, for the four points around every node.
+struct ColumnShade {
+  static constexpr int kColumns = LightVolume::kWidth * LightVolume::kWidth;
+  /// In slices, infinite if there is none; on the way from the light, against which slices count where
+  /// `falls`.
+  std::array<std::array<float, 4>, kColumns> begins;
+  bool falls = false;
+
+  ColumnShade() { begins.fill({INFINITY, INFINITY, INFINITY, INFINITY}); }
+  /// Adds it to the nodes of a brick whose first slice is `slice`.
+  void addTo(float* values, int slice, float perDepth) const;
+};
+
 /// The nodes of a brick from `column` of each, also of those a node outside of it, less the mean error of
 /// linear interpolation: once along the light, twice across, see LightVolume::replace.
 void replaceBrick(const std::function<float(const Vec3i&)>& column, float* out);

@@ -4,7 +4,7 @@
 // T_before - T_after with T = exp(-optical depth so far), so that the weights of a ray add up to its opacity
 // exactly, whatever the steps are.
 //
-// Steps are gathered into blocks of 16 that run across bricks. A block is looked up as vectors: brick table,
+// Steps are gathered into blocks of 32 that run across bricks. A block is looked up as vectors: brick table,
 // then the eight corners, in the density, in every sun's column densities and in the scattered light.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
@@ -25,8 +25,9 @@ namespace nephele::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kBlock = 16;
-using Lanes = hn::CappedTag<float, kBlock>;
+// Two vectors of the widest kind: while one waits for memory, the processor works on the other.
+constexpr int kBlock = 32;
+using Lanes = hn::CappedTag<float, 16>;
 using IntLanes = hn::RebindToSigned<Lanes>;
 using Floats = hn::Vec<Lanes>;
 using Ints = hn::Vec<IntLanes>;
@@ -42,6 +43,26 @@ HWY_INLINE Point pointAt(const LatticeRay& ray, Floats s) {
           hn::MulAdd(s, hn::Set(d, ray.direction.z), hn::Set(d, ray.origin.z))};
 }
 
+// values[at] and values[at + 1]. Gathers cost as many loads as they have lanes, so that fetching neighbours
+// together halves them.
+HWY_INLINE void gatherPair(const float* HWY_RESTRICT values, Ints at, Floats& first, Floats& second) {
+  const Lanes d;
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+  const hn::Repartition<std::int64_t, Lanes> wide;
+  const hn::Half<IntLanes> half;
+  const auto* pairs = reinterpret_cast<const std::int64_t*>(values);
+  const auto fetch = [&](auto index) HWY_ATTR {
+    return hn::BitCast(d, hn::GatherOffset(wide, pairs, hn::ShiftLeft<2>(hn::PromoteTo(wide, index))));
+  };
+  const Floats low = fetch(hn::LowerHalf(half, at)), high = fetch(hn::UpperHalf(half, at));
+  first = hn::ConcatEven(d, high, low);
+  second = hn::ConcatOdd(d, high, low);
+#else
+  first = hn::GatherIndex(d, values, at);
+  second = hn::GatherIndex(d, values + 1, at);
+#endif
+}
+
 // Values between the nodes around (x, y, z), all >= 0, of a block of nodes that starts at `base`.
 HWY_INLINE Floats trilinear(const float* HWY_RESTRICT values, Ints base, Point p, int strideY, int strideZ) {
   const Lanes d;
@@ -52,7 +73,8 @@ HWY_INLINE Floats trilinear(const float* HWY_RESTRICT values, Ints base, Point p
   const Ints at =
       hn::Add(hn::Add(base, ix), hn::Add(hn::Mul(iy, hn::Set(i, strideY)), hn::Mul(iz, hn::Set(i, strideZ))));
   const auto edge = [&](int offset) HWY_ATTR {
-    const Floats a = hn::GatherIndex(d, values + offset, at), b = hn::GatherIndex(d, values + offset + 1, at);
+    Floats a, b;
+    gatherPair(values + offset, at, a, b);
     return hn::MulAdd(fx, hn::Sub(b, a), a);
   };
   const Floats near0 = edge(0), near1 = edge(strideY), far0 = edge(strideZ), far1 = edge(strideZ + strideY);
@@ -107,25 +129,40 @@ class Marcher {
   Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result, MarchRecord* record)
       : scene_(scene), ray_(ray), result_(result), record_(record), isHeld_(!ray.holdout.empty()) {}
 
-  // `count` steps of length `ds` from `start` on. False once the ray is as good as opaque.
-  bool take(float start, float ds, int count) {
+  // `count` steps of length `ds` from `start` on, of this density if it is not negative. False once the ray
+  // is as good as opaque.
+  bool take(float start, float ds, int count, float density) {
     const Lanes d;
     const int lanes = int(hn::Lanes(d));
+    float begin = start;
     start += ray_.jitter * ds;
     while (count > 0) {
       // Whole vectors, whatever room there is: the blocks have as much again behind them.
       for (int i = 0; i < kBlock; i += lanes) {
         const Floats index = hn::Iota(d, float(i));
         hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), d, s_ + count_ + i);
+        hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), d, begin_ + count_ + i);
         hn::StoreU(hn::Set(d, ds), d, ds_ + count_ + i);
+        hn::StoreU(hn::Set(d, density), d, known_ + count_ + i);
       }
       const int taken = std::min(count, kBlock - count_);
       count_ += taken;
       count -= taken;
       start += float(taken) * ds;
+      begin += float(taken) * ds;
       if (count_ == kBlock && (!flush() || isHidden_)) return false;
     }
     return true;
+  }
+
+  // One step that is known. False once the ray is as good as opaque.
+  bool take(const MarchStep& step) {
+    jitter_ = 0.5f;
+    s_[count_] = step.place;
+    begin_[count_] = step.begin;
+    ds_[count_] = step.length;
+    known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
+    return ++count_ != kBlock || (flush() && !isHidden_);
   }
 
   void finish() {
@@ -136,26 +173,31 @@ class Marcher {
 
  private:
   // Adds the steps collected. False once the ray is as good as opaque.
-  bool flush() {
+  bool flush() { return count_ > kBlock / 2 ? flushFirst<kBlock>() : flushFirst<kBlock / 2>(); }
+
+  // Those among the first kSize of the block, where all are.
+  template <int kSize>
+  bool flushFirst() {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
     const int used = count_;
-    for (int i = used; i != kBlock; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f;
+    for (int i = used; i != kSize; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f, known_[i] = known_[used - 1];
     count_ = 0;
     result_.samples += std::uint32_t(used);
 
     alignas(64) float depth[kBlock];
     const Floats extinction = hn::Set(d, scene_.extinction);
-    for (std::size_t i = 0; i < kBlock; i += lanes) {
-      const Floats s = hn::Load(d, s_ + i);
-      const Floats density = hn::Max(
-          sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(scene_.density, pointAt(ray_.density, s)),
-          hn::Zero(d));
+    for (std::size_t i = 0; i < kSize; i += lanes) {
+      Floats density = hn::Load(d, known_ + i);
+      if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d))))
+        density = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
+                              scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i))),
+                          hn::Zero(d));
       hn::Store(hn::Mul(hn::Mul(density, extinction), hn::Load(d, ds_ + i)), d, depth + i);
     }
     alignas(64) float after[kBlock];
     const float start = depth_;
-    for (int i = 0; i != kBlock; ++i) after[i] = depth_ += depth[i];
+    for (int i = 0; i != kSize; ++i) after[i] = depth_ += depth[i];
     if (depth_ == start && !scene_.emission.table) return true;
     if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
@@ -165,16 +207,16 @@ class Marcher {
 
     if (isHeld_) hold(start, after, used);
     if (record_) record(start, after, used);
-    if (scene_.isColoured()) return flushColours(depth, after);
+    if (scene_.isColoured()) return flushColours<kSize>(depth, after);
 
     alignas(64) float through[kBlock + 1];
     through[0] = through_;
-    for (std::size_t i = 0; i < kBlock; i += lanes) {
+    for (std::size_t i = 0; i < kSize; i += lanes) {
       const Floats tau = hn::Min(hn::Load(d, after + i), hn::Set(d, 80.0f));
       hn::StoreU(hn::Exp(d, hn::Neg(tau)), d, through + 1 + i);
     }
-    through_ = through[kBlock];
-    for (std::size_t i = 0; i < kBlock; i += lanes) {
+    through_ = through[kSize];
+    for (std::size_t i = 0; i < kSize; i += lanes) {
       Floats weight = hn::Sub(hn::LoadU(d, through + i), hn::LoadU(d, through + i + 1));
       if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
       if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
@@ -186,7 +228,7 @@ class Marcher {
   // What the holdout leaves of every step, and of its opacity.
   void hold(float before, const float* after, int used) {
     for (int i = 0; i != used; ++i) {
-      const float middle = ray_.start + s_[i] + (0.5f - ray_.jitter) * ds_[i];
+      const float middle = ray_.start + begin_[i] + 0.5f * ds_[i];
       seen_[i] = ray_.holdout.transmittance(middle * ray_.cosine, holdoutCursor_);
       for (int c = 0; c != 3; ++c) {
         const float share = scene_.extinctionColour[c];
@@ -215,14 +257,14 @@ class Marcher {
       if (after[i] == before && !scene_.emission.table) continue;
       const float gain = scene_.meanOpacity(after[i]) - scene_.meanOpacity(before);
       opacity = isHeld_ ? opacity + seen_[i] * gain : scene_.meanOpacity(after[i]);
-      const float begin = s_[i] - ray_.jitter * ds_[i];
-      record_->steps.push_back({begin, begin + ds_[i], opacity});
+      record_->steps.push_back({begin_[i], begin_[i] + ds_[i], opacity});
       before = after[i];
     }
   }
 
   // The same where colours differ in more than their albedo: `after` are optical depths behind the steps,
   // `depth` their own.
+  template <int kSize>
   bool flushColours(const float* depth, const float* after) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
@@ -230,13 +272,13 @@ class Marcher {
     for (int c = 0; c != 3; ++c) {
       through[c][0] = throughColours_[c];
       const Floats share = hn::Set(d, -scene_.extinctionColour[c]);
-      for (std::size_t i = 0; i < kBlock; i += lanes) {
+      for (std::size_t i = 0; i < kSize; i += lanes) {
         const Floats tau = hn::Max(hn::Mul(hn::Load(d, after + i), share), hn::Set(d, -80.0f));
         hn::StoreU(hn::Exp(d, tau), d, through[c] + 1 + i);
       }
-      throughColours_[c] = through[c][kBlock];
+      throughColours_[c] = through[c][kSize];
     }
-    for (std::size_t i = 0; i < kBlock; i += lanes) {
+    for (std::size_t i = 0; i < kSize; i += lanes) {
       const Floats s = hn::Load(d, s_ + i), own = hn::Load(d, depth + i);
       Floats weight[3];
       for (int c = 0; c != 3; ++c)
@@ -317,7 +359,7 @@ class Marcher {
     const Floats least = hn::Set(d, light.least), one = hn::Set(d, 1.0f), zero = hn::Zero(d);
     const Floats length = hn::Max(ds, least), away2 = hn::Set(d, line.distance2), away = hn::Sqrt(away2);
     const Floats along = hn::Sub(s, hn::Set(d, line.closest));
-    const Floats first = hn::NegMulAdd(hn::Set(d, ray_.jitter), length, along), last = hn::Add(first, length);
+    const Floats first = hn::NegMulAdd(hn::Set(d, jitter_), length, along), last = hn::Add(first, length);
     const Floats r = hn::Sqrt(hn::MulAdd(along, along, away2));
     Floats share = one;
     {
@@ -451,9 +493,14 @@ class Marcher {
   // Nothing farther away is seen.
   bool isHidden_ = false;
   std::size_t holdoutCursor_ = 0;
+  // Where in its step a sample is, about.
+  float jitter_ = ray_.jitter;
   alignas(64) float seen_[kBlock];
   alignas(64) float s_[2 * kBlock];
   alignas(64) float ds_[2 * kBlock];
+  alignas(64) float begin_[2 * kBlock];
+  // Densities, negative where they have to be looked up.
+  alignas(64) float known_[2 * kBlock];
   int count_ = 0;
   float depth_ = 0.0f;
   float through_ = 1.0f;
@@ -467,7 +514,22 @@ void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* resu
     results[i].distance = std::numeric_limits<float>::infinity();
     if (records) records[i].clear();
     Marcher marcher(scene, rays[i], results[i], records ? records + i : nullptr);
-    detail::forEachRun(scene, rays[i], [&](float s, float ds, int n) { return marcher.take(s, ds, n); });
+    detail::forEachRun(scene, rays[i], [&](float s, float ds, int n, float density) {
+      return marcher.take(s, ds, n, density);
+    });
+    marcher.finish();
+  }
+}
+
+void marchStepsBatch(const MarchScene& scene, const MarchRay* rays, const std::span<const MarchStep>* steps,
+                     MarchResult* results, MarchRecord* records, std::size_t count) {
+  for (std::size_t i = 0; i != count; ++i) {
+    results[i] = {};
+    results[i].distance = std::numeric_limits<float>::infinity();
+    if (records) records[i].clear();
+    Marcher marcher(scene, rays[i], results[i], records ? records + i : nullptr);
+    for (const MarchStep& step : steps[i])
+      if (!marcher.take(step)) break;
     marcher.finish();
   }
 }
@@ -482,6 +544,7 @@ HWY_AFTER_NAMESPACE();
 namespace nephele {
 
 HWY_EXPORT(marchBatch);
+HWY_EXPORT(marchStepsBatch);
 
 void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,
                std::span<MarchRecord> records) {
@@ -489,6 +552,16 @@ void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::spa
   require(records.empty() || records.size() == rays.size(), "march: as many records as rays are needed");
   HWY_DYNAMIC_DISPATCH(marchBatch)
   (scene, rays.data(), results.data(), records.empty() ? nullptr : records.data(), rays.size());
+}
+
+void marchSteps(const MarchScene& scene, std::span<const MarchRay> rays,
+                std::span<const std::span<const MarchStep>> steps, std::span<MarchResult> results,
+                std::span<MarchRecord> records) {
+  require(rays.size() == results.size(), "march: as many results as rays are needed");
+  require(rays.size() == steps.size(), "march: as many lists of steps as rays are needed");
+  require(records.empty() || records.size() == rays.size(), "march: as many records as rays are needed");
+  HWY_DYNAMIC_DISPATCH(marchStepsBatch)
+  (scene, rays.data(), steps.data(), results.data(), records.empty() ? nullptr : records.data(), rays.size());
 }
 
 namespace {
@@ -650,7 +723,7 @@ void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays,
   for (std::size_t i = 0; i != rays.size(); ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
-    detail::forEachRun(scene, rays[i], [&](float start, float ds, int count) {
+    detail::forEachRun(scene, rays[i], [&](float start, float ds, int count, float) {
       for (int n = 0; n != count; ++n)
         if (!stepScalar(scene, rays[i], start + (float(n) + rays[i].jitter) * ds, ds, results[i]))
           return false;

@@ -40,6 +40,8 @@ struct HoldoutCurve {
 /// A ray from where it enters the volume to where it leaves it, s from 0 to `length` in world units.
 struct MarchRay {
   LatticeRay density, scattered;
+  /// In the world, for densities that are no grid.
+  LatticeRay world;
   LatticeRay suns[MarchScene::kMostSuns];
   /// In a local light's frame.
   struct Local {
@@ -102,6 +104,17 @@ struct MarchRecord {
 /// Behind a holdout with transmittance H the weight of a step is H T (1 - dT), and T goes on as without it.
 void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,
                std::span<MarchRecord> records = {});
+
+/// A step of known optical depth, and where on the ray its light is read. Steps that follow each other do not
+/// overlap; between them there is nothing.
+struct MarchStep {
+  float begin = 0.0f, length = 0.0f, opticalDepth = 0.0f, place = 0.0f;
+};
+
+/// As marchRays where the steps are known, near to far: the densities of `scene` are not read.
+void marchSteps(const MarchScene& scene, std::span<const MarchRay> rays,
+                std::span<const std::span<const MarchStep>> steps, std::span<MarchResult> results,
+                std::span<MarchRecord> records = {});
 
 /// The same sample by sample: the truth that marchRays is tested against.
 void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -26,6 +28,8 @@ struct MarchScene {
   Bricks density;
   const Interval* ranges = nullptr;
   const std::uint8_t* emptiness = nullptr;
+  /// See RenderVolume; null where it is not to be used.
+  const std::uint8_t* uniformity = nullptr;
   float extinction = 1.0f;
 
   /// Bricks of three numbers on the density's lattice; none where the table is null.
@@ -45,6 +49,9 @@ struct MarchScene {
   float extinctionColour[3] = {1.0f, 1.0f, 1.0f};
   bool hasExtinctionColour() const {
     return extinctionColour[0] != 1.0f || extinctionColour[1] != 1.0f || extinctionColour[2] != 1.0f;
+  }
+  float leastColour() const {
+    return std::min({extinctionColour[0], extinctionColour[1], extinctionColour[2]});
   }
   /// Mean of the colours' opacities at an optical depth.
   float meanOpacity(float opticalDepth) const {
@@ -108,6 +115,8 @@ struct MarchScene {
   /// that is larger (up to 4 steps). Within a brick no more than an optical depth of `stepDepth` in its
   /// densest voxel, but at least `leastStep`.
   float step = 1.0f, uniformStep = 1.0f, leastStep = 0.125f, stepDepth = 0.5f;
+  /// Times this at most, steps grow with the optical depth in front of them, since less is seen of them.
+  float mostGrowth = 4.0f;
   /// Width of a pixel per distance.
   float pixelAngle = 0.0f;
   /// Stop where less than this is transmitted.

@@ -473,6 +473,7 @@ void addLayers(Image& image, const RenderVolume& volume, const Medium& medium, c
 RenderResult pathTraceImage(const RenderVolume& volume, const Medium& medium, const Lights& lights,
                             const Camera& camera, const PathOptions& options, const Progress& progress) {
   check(medium, lights, options);
+  require(!volume.field(), "path tracing: needs a density that is a grid; fieldVolume makes one of a field");
   RenderResult result;
   Image& image = result.image;
   const PixelBox window = camera.window();

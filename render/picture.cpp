@@ -13,6 +13,11 @@ namespace {
 // Directions in which the objects of a pixel look for the sky.
 constexpr int kSkyRays = 64;
 
+constexpr DepthBounds::Range kAnywhere{0, std::numeric_limits<float>::infinity()};
+
+// Rays that are marched through a field together: enough for long blocks of points, few enough for the cache.
+constexpr int kFieldRays = 64;
+
 // The part of a ray inside a box, as distances; empty if far <= near.
 struct Span {
   double near = 0, far = std::numeric_limits<double>::infinity();
@@ -57,7 +62,22 @@ Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOption
   if (film.wantsPoints()) preparePoints(film, options);
   isDeep_ = options.deep.has_value();
   holdout_ = options.holdout.get();
+  // What deep pictures and holdouts cut is measured by steps, whatever is seen of them.
+  if (isDeep_ || holdout_) scene_.mostGrowth = 1, scene_.uniformStep = scene_.step;
   surfaces_ = options.surfaces.get();
+  if (!blurred_) bounds_.emplace(*lit.source, camera);
+  if ((field_ = lit.source->field())) {
+    fieldSteps_.longest = options.step.value_or(0.25f * lit.voxelSize);
+    fieldSteps_.pixelAngle = scene_.pixelAngle;
+    if (camera.isOrthographic()) fieldSteps_.pixelWidth = float(camera.pixelWidth(0));
+    fieldSteps_.threshold = options.refinement.threshold;
+    fieldSteps_.halvings = options.refinement.halvings;
+    // What is lost between two places where the light is read is as the square of their distance.
+    const float finer = std::min(std::sqrt(options.refinement.threshold * 128), 1.0f);
+    fieldSteps_.lightDepth = scene_.stepDepth * finer;
+    fieldSteps_.lightLength = lit.voxelSize * finer;
+    fieldSteps_.uniformLength = scene_.locals.empty() ? 4 * lit.voxelSize * finer : fieldSteps_.lightLength;
+  }
   shadowScene_ = scene_;
   shadowScene_.suns.clear();
   shadowScene_.locals.clear();
@@ -86,7 +106,8 @@ bool Picture::centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<S
   world = middle_->ray(x + 0.5, y + 0.5);
   const double frames = 0.5 * (shutter_.open + shutter_.close),
                cosine = dot(world.direction, middle_->forward());
-  const bool isInside = prepare(motion_ ? motion_->toBody(world, frames) : world, SubSample{}, 0.0, out);
+  const bool isInside =
+      prepare(motion_ ? motion_->toBody(world, frames) : world, kAnywhere, SubSample{}, 0.0, out);
   out.cosine = float(cosine);
   if (!meet(world, cosine, isInside, out, hit)) return false;
   if (holdout_) out.holdout = holdout_->at(x, y);
@@ -110,8 +131,7 @@ void Picture::points(const PixelBox& box, Scratch& scratch) const {
   }
   const std::size_t live = pixels.size();
   scratch.results.resize(live);
-  scratch.records.resize(std::max(scratch.records.size(), live));
-  marchRays(pointScene_, {scratch.rays.data(), live}, scratch.results, {scratch.records.data(), live});
+  marchAll(pointScene_, live, true, scratch);
 
   const double frames = 0.5 * (shutter_.open + shutter_.close);
   std::vector<Vec3f> positions, normals;
@@ -179,7 +199,8 @@ bool Picture::meet(const Ray& world, double cosine, bool isInside, MarchRay& ray
 Vec3f Picture::through(const Vec3d& from, const Vec3d& towards, double distance, const Vec3f& shadow) const {
   const Ray world{from, towards};
   MarchRay ray;
-  if (!enter(motion_ ? motion_->toBody(world, 0.5 * (shutter_.open + shutter_.close)) : world, ray) ||
+  if (!enter(motion_ ? motion_->toBody(world, 0.5 * (shutter_.open + shutter_.close)) : world, kAnywhere,
+             ray) ||
       double(ray.start) >= distance)
     return {1, 1, 1};
   ray.length = std::min(ray.length, float(distance - double(ray.start)));
@@ -249,29 +270,43 @@ float Picture::addSurface(const Surfaces::Hit& hit, const MarchRay& ray, const M
   return opacity;
 }
 
-bool Picture::enter(const Ray& ray, MarchRay& out) const {
-  const Span span = clip(lit_.toDensity.point(ray.origin), lit_.toDensity.vector(ray.direction), lit_.bounds);
+// `reach`: depths along the line of sight beyond which nothing needs to be looked for.
+bool Picture::enter(const Ray& ray, const DepthBounds::Range& reach, MarchRay& out) const {
+  Span span = field_
+                  ? clip(ray.origin, ray.direction, field_->box())
+                  : clip(lit_.toDensity.point(ray.origin), lit_.toDensity.vector(ray.direction), lit_.bounds);
+  if (reach.near > 0) {
+    const double perDepth = 1 / dot(ray.direction, camera_.forward());
+    span = {std::max(span.near, double(reach.near) * perDepth),
+            std::min(span.far, double(reach.far) * perDepth)};
+  }
   if (!(span.far > span.near)) return false;
   const Vec3d entry = ray.origin + ray.direction * span.near;
   out.density = lit_.toDensity.ray(entry, ray.direction);
+  out.world = {Vec3f(entry), Vec3f(ray.direction)};
   out.start = float(span.near);
   out.length = float(span.far - span.near);
   return true;
 }
 
-bool Picture::prepare(const Ray& ray, const SubSample& sub, double shift, MarchRay& out) const {
-  if (!enter(ray, out)) return false;
+bool Picture::prepare(const Ray& ray, const DepthBounds::Range& reach, const SubSample& sub, double shift,
+                      MarchRay& out) const {
+  if (!enter(ray, reach, out)) return false;
   const Vec3d entry = ray.origin + ray.direction * double(out.start);
   out.jitter = float(sub.step + shift);
   out.cosine = float(dot(ray.direction, camera_.forward()));
-  out.density.origin += sub.lattice;
+  // Density and suns are looked up at the same place beside the ray: what a place receives is not mixed with
+  // what its neighbours hide. Terraces less than a pixel wide need no hiding.
+  const Vec3f beside =
+      sub.lattice * std::min(1.0f, lit_.voxelSize / (4 * float(camera_.pixelWidth(double(out.start)))));
+  const Vec3d besideEntry = entry + Vec3d(lit_.source->density().indexToWorld.linear * beside);
+  out.density.origin += beside;
   if (lit_.toScattered) {
     out.scattered = lit_.toScattered->ray(entry + ray.direction * double(lit_.lookAhead), ray.direction);
     out.scattered.origin += sub.lattice;
   }
   for (std::size_t sun = 0; sun != lit_.toSun.size(); ++sun) {
-    out.suns[sun] = lit_.toSun[sun].ray(entry, ray.direction);
-    out.suns[sun].origin += sub.lattice;
+    out.suns[sun] = lit_.toSun[sun].ray(besideEntry, ray.direction);
     // Light travels away from the sun, then back along the ray.
     const float cosine = float(dot(lit_.directions[sun], ray.direction));
     // Every octave less what the one before it sees.
@@ -307,24 +342,54 @@ bool Picture::prepareBlurred(int x, int y, const SubSample& sub, double shift, M
   const SubSample at = shifted(sub, x, y);
   const Ray ray = worldRay(x, y, sub);
   const double frames = shutter_.open + at.time * (shutter_.close - shutter_.open);
-  if (!prepare(motion_ ? motion_->toBody(ray, frames) : ray, at, shift, out)) return false;
+  if (!prepare(motion_ ? motion_->toBody(ray, frames) : ray, kAnywhere, at, shift, out)) return false;
   out.cosine = float(dot(ray.direction, camera_.forwardAt(at.time)));
   return true;
 }
 
-std::uint64_t Picture::pixel(int x, int y, Scratch& scratch) const {
+int Picture::pixelsTogether() const {
+  return field_ ? std::clamp(kFieldRays / int(pattern_.size()), 1, kFieldRays) : 1;
+}
+
+void Picture::march(int x, int y, int count, Scratch& scratch) const {
+  scratch.begins.assign(1, 0);
+  for (int i = 0; i != count; ++i) addRays(x + i, y, scratch);
+  marchAll(scene_, scratch.begins.back(), isDeep_, scratch);
+}
+
+// The first `count` rays.
+void Picture::marchAll(const MarchScene& scene, std::size_t count, bool isRecorded, Scratch& scratch) const {
+  scratch.results.resize(std::max(scratch.results.size(), count));
+  if (isRecorded) scratch.records.resize(std::max(scratch.records.size(), count));
+  const std::span<const MarchRay> rays{scratch.rays.data(), count};
+  const std::span<MarchResult> results{scratch.results.data(), count};
+  const std::span<MarchRecord> records{scratch.records.data(), isRecorded ? count : 0};
+  if (field_) {
+    if (!scratch.field) scratch.field.emplace(*field_, fieldSteps_);
+    scratch.field->march(scene, rays, results, records);
+  } else {
+    marchRays(scene, rays, results, records);
+  }
+}
+
+// Adds the rays of a pixel that may meet anything.
+void Picture::addRays(int x, int y, Scratch& scratch) const {
   std::vector<MarchRay>& rays = scratch.rays;
-  std::vector<MarchResult>& results = scratch.results;
-  const std::size_t count = pattern_.size();
+  const std::size_t count = pattern_.size(), first = scratch.begins.back();
   const double shift = count > 1 ? stepShift(x, y) / double(count) : 0.0;
-  rays.resize(count);
-  results.resize(count);
-  scratch.hits.resize(count);
-  scratch.seen.resize(count);
-  std::size_t live = 0;
+  rays.resize(std::max(rays.size(), first + count));
+  scratch.hits.resize(rays.size());
+  scratch.seen.resize(rays.size());
+  std::size_t live = first;
+  const DepthBounds::Range reach = bounds_ ? bounds_->at(x, y) : kAnywhere;
+  if (reach.isEmpty() && !surfaces_) {
+    scratch.begins.push_back(live);
+    return;
+  }
   for (const SubSample& sub : pattern_) {
     bool isInside = blurred_ ? prepareBlurred(x, y, sub, shift, rays[live])
-                             : prepare(camera_.ray(x + sub.x, y + sub.y), sub, shift, rays[live]);
+                             : !reach.isEmpty() &&
+                                   prepare(camera_.ray(x + sub.x, y + sub.y), reach, sub, shift, rays[live]);
     if (surfaces_) {
       const Ray world = worldRay(x, y, sub);
       const Vec3d forward = blurred_ ? camera_.forwardAt(shifted(sub, x, y).time) : camera_.forward();
@@ -335,22 +400,21 @@ std::uint64_t Picture::pixel(int x, int y, Scratch& scratch) const {
   }
   if (holdout_) {
     const HoldoutCurve curve = holdout_->at(x, y);
-    for (std::size_t i = 0; i != live; ++i) rays[i].holdout = curve;
+    for (std::size_t i = first; i != live; ++i) rays[i].holdout = curve;
   }
-  if (isDeep_) {
-    scratch.records.resize(std::max(scratch.records.size(), live));
-    marchRays(scene_, {rays.data(), live}, {results.data(), live}, {scratch.records.data(), live});
-    scratch.deep.begin(count);
-  } else {
-    marchRays(scene_, {rays.data(), live}, {results.data(), live});
-  }
+  scratch.begins.push_back(live);
+}
 
+std::uint64_t Picture::gather(int index, Scratch& scratch) const {
+  const std::vector<MarchRay>& rays = scratch.rays;
+  const std::size_t count = pattern_.size();
+  if (isDeep_) scratch.deep.begin(count);
   PixelSum& out = scratch.sum;
   out = {};
   std::uint64_t samples = 0;
   const float share = 1.0f / float(count);
-  for (std::size_t i = 0; i != live; ++i) {
-    const MarchResult& result = results[i];
+  for (std::size_t i = scratch.begins[std::size_t(index)]; i != scratch.begins[std::size_t(index) + 1]; ++i) {
+    const MarchResult& result = scratch.results[i];
     samples += result.samples;
     Vec3f opacity = Vec3f{1, 1, 1} * -std::expm1(-result.opticalDepth);
     if (scene_.hasExtinctionColour())

@@ -7,6 +7,8 @@
 #include "render/baked_light.h"
 #include "render/camera.h"
 #include "render/deep_image.h"
+#include "render/depth_bounds.h"
+#include "render/field_march.h"
 #include "render/film.h"
 #include "render/march_kernels.h"
 #include "render/pixel_points.h"
@@ -23,6 +25,9 @@ class Picture {
     explicit Scratch(const RenderOptions& options) : deep(options.deep.value_or(DeepOptions{})) {}
 
     std::vector<MarchRay> rays;
+    // Where the rays of every pixel that is marched begin, and where the last ones end.
+    std::vector<std::size_t> begins;
+    std::optional<FieldMarcher> field;
     std::vector<MarchResult> results;
     std::vector<MarchRecord> records;
     std::vector<std::optional<Surfaces::Hit>> hits;
@@ -37,9 +42,13 @@ class Picture {
   /// Keeps references to all of them.
   Picture(const BakedLight& lit, const Camera& camera, const RenderOptions& options, const Film& film);
 
-  /// Marches the rays of a pixel into scratch.sum and, for deep pictures, scratch.samples; returns the
+  /// Pixels of a row that are best marched at a time.
+  int pixelsTogether() const;
+  /// Marches the rays of `count` pixels of a row.
+  void march(int x, int y, int count, Scratch& scratch) const;
+  /// Sums up the rays of one of them into scratch.sum and, for deep pictures, scratch.samples; returns the
   /// samples taken.
-  std::uint64_t pixel(int x, int y, Scratch& scratch) const;
+  std::uint64_t gather(int index, Scratch& scratch) const;
 
   /// What the centres of the pixels meet, row by row, into scratch.points.
   void points(const PixelBox& box, Scratch& scratch) const;
@@ -54,8 +63,11 @@ class Picture {
   Vec3f lightOn(const Surfaces::Hit& hit, const Vec3d& place, std::size_t sample) const;
   float addSurface(const Surfaces::Hit& hit, const MarchRay& ray, const MarchResult& result, const Ray& world,
                    std::size_t sample, PixelSum& out, Vec3f& colour) const;
-  bool enter(const Ray& ray, MarchRay& out) const;
-  bool prepare(const Ray& ray, const SubSample& sub, double shift, MarchRay& out) const;
+  void marchAll(const MarchScene& scene, std::size_t count, bool isRecorded, Scratch& scratch) const;
+  void addRays(int x, int y, Scratch& scratch) const;
+  bool enter(const Ray& ray, const DepthBounds::Range& reach, MarchRay& out) const;
+  bool prepare(const Ray& ray, const DepthBounds::Range& reach, const SubSample& sub, double shift,
+               MarchRay& out) const;
   bool prepareBlurred(int x, int y, const SubSample& sub, double shift, MarchRay& out) const;
 
   const BakedLight& lit_;
@@ -64,7 +76,12 @@ class Picture {
   std::optional<RigidMotion> motion_;
   bool blurred_;
   std::vector<SubSample> pattern_;
+  // None for rays that are spread over a lens or over time.
+  std::optional<DepthBounds> bounds_;
   MarchScene scene_;
+  // Null where the density is a grid.
+  const FieldDensity* field_ = nullptr;
+  FieldSteps fieldSteps_;
   bool isDeep_ = false;
   const Holdout* holdout_ = nullptr;
   const Surfaces* surfaces_ = nullptr;

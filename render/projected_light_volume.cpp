@@ -23,6 +23,7 @@
 #include "modeling/error.h"
 #include "modeling/parallel.h"
 #include "render/light_volume.h"
+#include "render/sub_samples.h"
 
 namespace nephele {
 
@@ -322,6 +323,41 @@ void ProjectedLightVolume::replace(const std::function<float(const Vec3f&)>& col
             face.values.data() + std::size_t(face.table[entry]) * LightVolume::kVolume);
       }
     });
+}
+
+void ProjectedLightVolume::addShade(const std::function<double(const Ray&)>& distanceToShade,
+                                    float perDepth) {
+  const Affine frameToWorld = inverse(worldToFrame_);
+  const Vec3d light(frameToWorld.translation);
+  for (Face& face : faces_) {
+    const std::size_t nx = std::size_t(face.brickCount.x), across = nx * std::size_t(face.brickCount.y);
+    parallelFor(across, 4, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t column = begin; column != end; ++column) {
+        bool isThere = false;
+        for (std::size_t n = 0; n != std::size_t(face.brickCount.z); ++n)
+          isThere = isThere || face.table[n * across + column];
+        if (!isThere) continue;
+        const Vec3i node = (face.firstBrick + Vec3i{int(column % nx), int(column / nx), 0}) * kBrick;
+        detail::ColumnShade shade;
+        for (std::size_t m = 0; m != shade.begins.size(); ++m)
+          for (std::size_t p = 0; p != 4; ++p) {
+            Vec3f q;
+            q[(face.axis + 1) % 3] =
+                (float(node.x + int(m) % kWidth) + kQuarterCorners[p].x) / face.perTangent;
+            q[(face.axis + 2) % 3] =
+                (float(node.y + int(m) / kWidth) + kQuarterCorners[p].y) / face.perTangent;
+            q[face.axis] = face.side;
+            const Vec3d way(frameToWorld.linear * q);
+            shade.begins[m][p] =
+                float(distanceToShade({light, normalize(way)}) / length(way)) * face.perDepth;
+          }
+        for (std::size_t n = 0; n != std::size_t(face.brickCount.z); ++n)
+          if (const std::int32_t pool = face.table[n * across + column])
+            shade.addTo(face.values.data() + std::size_t(pool) * LightVolume::kVolume,
+                        node.z + int(n) * kBrick, perDepth);
+      }
+    });
+  }
 }
 
 float ProjectedLightVolume::columnDensity(const Vec3f& world) const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "modeling/progress.h"
+#include "render/camera.h"
 #include "render/lights.h"
 #include "render/render_volume.h"
 
@@ -37,6 +38,8 @@ class ProjectedLightVolume {
 
   /// As LightVolume::replace.
   void replace(const std::function<float(const Vec3f&)>& column);
+  /// As LightVolume::addShade, for rays that start at the light.
+  void addShade(const std::function<double(const Ray&)>& distanceToShade, float perDepth);
 
   /// From world space to the light's frame.
   const Affine& worldToFrame() const { return worldToFrame_; }

@@ -49,6 +49,10 @@ void check(const RenderOptions& options) {
           fmt::format("samples: expected 1 to 4096, got {}", options.samples));
   require(!options.step || (std::isfinite(*options.step) && *options.step > 0),
           fmt::format("step: expected a length > 0, got {}", options.step.value_or(0)));
+  require(std::isfinite(options.refinement.threshold) && options.refinement.threshold > 0,
+          fmt::format("refinement: expected a threshold > 0, got {}", options.refinement.threshold));
+  require(options.refinement.halvings >= 0 && options.refinement.halvings <= 16,
+          fmt::format("refinement: expected 0 to 16 halvings, got {}", options.refinement.halvings));
   require(std::isfinite(options.shutter.open) && std::isfinite(options.shutter.close) &&
               options.shutter.open <= options.shutter.close,
           fmt::format("shutter: expected an opening not after the closing, got {}, {}", options.shutter.open,
@@ -66,9 +70,11 @@ std::vector<std::string> lightNames(const Lights& lights, const RenderOptions& o
 std::shared_ptr<const detail::BakedLight> bake(const RenderVolume& volume, const Medium& medium,
                                                const Lights& lights, const Octaves& octaves,
                                                const detail::BakedLight* before, const Progress& progress,
-                                               const Surfaces* surfaces = nullptr) {
+                                               const Surfaces* surfaces) {
   check(medium, lights, octaves);
-  if (volume.isEmpty() || medium.extinction == 0 || medium.extinctionColour == Vec3f{}) return nullptr;
+  const bool isSeen = !volume.isEmpty() && medium.extinction > 0 && medium.extinctionColour != Vec3f{};
+  require(isSeen || !surfaces, "objects: need a volume that is not empty and has an extinction");
+  if (!isSeen) return nullptr;
   return std::make_shared<const detail::BakedLight>(volume, medium, lights, octaves, before, progress,
                                                     surfaces);
 }
@@ -100,6 +106,7 @@ RenderResult look(const detail::BakedLight* lit, const Camera& camera, const Ren
       std::size_t(across) * down, 1,
       [&](std::size_t begin, std::size_t end) {
         detail::Picture::Scratch scratch(options);
+        const int together = picture.pixelsTogether();
         for (std::size_t tile = begin; tile != end; ++tile) {
           const int x0 = int(tile % std::size_t(across)) * kTile,
                     y0 = int(tile / std::size_t(across)) * kTile;
@@ -108,7 +115,9 @@ RenderResult look(const detail::BakedLight* lit, const Camera& camera, const Ren
           for (int y = y0; y < y1; ++y)
             for (int x = x0; x < x1; ++x) {
               const std::size_t at = std::size_t(y) * width + x;
-              taken += picture.pixel(window.x0 + x, window.y0 + y, scratch);
+              if ((x - x0) % together == 0)
+                picture.march(window.x0 + x, window.y0 + y, std::min(together, x1 - x), scratch);
+              taken += picture.gather((x - x0) % together, scratch);
               film.set(at, scratch.sum);
               if (result.deep) result.deep->pixels[at] = std::move(scratch.samples);
             }
@@ -145,17 +154,20 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
   const ScatteredLight::Bytes scattered = ScatteredLight::estimateBytes(volume);
   // The sky's map may hold suns of its own.
   const int spots = lights.map ? MarchScene::kMostSuns - int(Lights::kMost) : 0;
-  return double(lights.suns.size() + std::size_t(spots)) * LightVolume::estimateBytes(volume) +
+  const double others = (options.surfaces ? double(options.surfaces->memoryBytes()) : 0.0) +
+                        (options.holdout ? double(options.holdout->memoryBytes()) : 0.0);
+  return others + double(lights.suns.size() + std::size_t(spots)) * LightVolume::estimateBytes(volume) +
          double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume) + scattered.working +
          3.0 * double(lights.names().size() + std::size_t(spots) + volume.hasEmission()) * scattered.kept +
          double(camera.window().width()) * camera.window().height() * floats * sizeof(float);
 }
 
 LitVolume::LitVolume(const RenderVolume& volume, const Medium& medium, const Lights& lights,
-                     const Octaves& octaves, const Progress& progress)
-    : volume_(&volume), medium_(medium), lights_(lights), octaves_(octaves) {
+                     const Octaves& octaves, const Progress& progress,
+                     std::shared_ptr<const Surfaces> surfaces)
+    : volume_(&volume), medium_(medium), lights_(lights), octaves_(octaves), surfaces_(std::move(surfaces)) {
   const auto start = std::chrono::steady_clock::now();
-  light_ = bake(volume, medium, lights, octaves, nullptr, progress);
+  light_ = bake(volume, medium, lights, octaves, nullptr, progress, surfaces_.get());
   lightSeconds_ = secondsSince(start);
 }
 
@@ -163,7 +175,7 @@ LitVolume LitVolume::underOther(const Lights& lights, const Progress& progress) 
   LitVolume other = *this;
   const auto start = std::chrono::steady_clock::now();
   other.lights_ = lights;
-  other.light_ = bake(*volume_, medium_, lights, octaves_, light_.get(), progress);
+  other.light_ = bake(*volume_, medium_, lights, octaves_, light_.get(), progress, surfaces_.get());
   other.lightSeconds_ = secondsSince(start);
   return other;
 }
@@ -172,7 +184,7 @@ RenderResult LitVolume::render(const Camera& camera, const RenderOptions& option
                                const Progress& progress) const {
   check(options);
   require(options.octaves == octaves_, "octaves: differ from those that the light was made with");
-  require(!options.surfaces, "objects: are not possible where the light is made beforehand");
+  require(options.surfaces == surfaces_, "objects: differ from those that the light was made with");
   Film film(camera, lightNames(lights_, options), options.aovs);
   return look(light_.get(), camera, options, film, progress);
 }
@@ -185,7 +197,6 @@ RenderResult renderImage(const RenderVolume& volume, const Medium& medium, const
   Film film(camera, lightNames(lights, options), options.aovs);
   const auto start = std::chrono::steady_clock::now();
   const auto light = bake(volume, medium, lights, options.octaves, nullptr, progress, options.surfaces.get());
-  require(light || !options.surfaces, "objects: need a volume that is not empty and has an extinction");
   const double lightSeconds = secondsSince(start);
   RenderResult result = look(light.get(), camera, options, film, progress);
   if (light) result.lightSeconds = lightSeconds;

@@ -18,13 +18,27 @@
 
 namespace nephele {
 
+/// How finely rays look at a density that is a field and not a grid, see gridlessVolume.
+struct Refinement {
+  /// A step is halved where that changes the opacity that is seen of it, behind all that is in front, by more
+  /// than this.
+  float threshold = 1.0f / 1024;
+  /// As often as this at most, 0 to 16. 0: steps of one length through all bricks of 8^3 voxels that may hold
+  /// anything.
+  int halvings = 5;
+};
+
 /// How a picture is made.
 struct RenderOptions {
   Octaves octaves;
   /// Longest step in world units; default: one voxel, four where the density hardly varies. Where a voxel is
-  /// nearly opaque steps are shorter by themselves, and where a pixel is wider than a step, steps grow with
-  /// it. Opacity does not depend on it.
+  /// nearly opaque steps are shorter by themselves; where a pixel is wider than a step, or little is seen of
+  /// one since much lies in front, steps grow, to 4 times that at most. Opacity does not depend on it.
+  /// Of a field: how far apart the first samples of a ray are, at most; they stand as close as pixels are
+  /// wide where that is less. Default: a quarter of a voxel.
   std::optional<float> step;
+  /// Where the density is a field.
+  Refinement refinement{};
   /// Rays per pixel. One goes through the centre; more are spread over a tent two pixels wide.
   int samples = 4;
   /// Moves the pattern of the samples.
@@ -39,8 +53,8 @@ struct RenderOptions {
   std::optional<DeepOptions> deep{};
   /// Hides what is behind it; for pictures of the camera's size.
   std::shared_ptr<const Holdout> holdout{};
-  /// Opaque objects, lit by suns, points, spots and the sky through the volume, and casting the suns' shadows
-  /// into it. They stand still, and scatter no light into it. Layer light_objects.
+  /// Opaque objects, lit by suns, points, spots and the sky through the volume, and casting the shadows of
+  /// suns, points and spots into it. They stand still, and scatter no light into it. Layer light_objects.
   std::shared_ptr<const Surfaces> surfaces{};
   /// Extra layers, see Film: "Z" (distance along the line of sight at which the opacity passes 0.5 %, the
   /// nearest of the pixel's rays; +inf where none does), "transmittance" (1 - opacity), "albedo" (times
@@ -86,15 +100,17 @@ struct BakedLight;
 /// parts. The pictures are the same. Cheap to copy.
 class LitVolume {
  public:
-  /// Keeps a reference to `volume`. @throws Error if an argument is outside its range.
+  /// Keeps a reference to `volume`. `surfaces`, if there are any, cast their shadows into it, and belong into
+  /// the options of its pictures. @throws Error if an argument is outside its range, or there are objects and
+  /// nothing to be seen of the volume.
   LitVolume(const RenderVolume& volume, const Medium& medium, const Lights& lights, const Octaves& octaves,
-            const Progress& progress = silent());
+            const Progress& progress = silent(), std::shared_ptr<const Surfaces> surfaces = nullptr);
 
   /// The same volume under `lights`. What they have in common with the present ones is not made again: the
   /// sky's part, where only suns differ.
   LitVolume underOther(const Lights& lights, const Progress& progress = silent()) const;
 
-  /// @throws Error as renderImage does, or if the octaves are not those that the light was made with.
+  /// @throws Error as renderImage does, or if octaves or objects are not those that the light was made with.
   /// `lightSeconds` of the result is 0.
   RenderResult render(const Camera& camera, const RenderOptions& options,
                       const Progress& progress = silent()) const;
@@ -108,6 +124,7 @@ class LitVolume {
   Medium medium_;
   Lights lights_;
   Octaves octaves_;
+  std::shared_ptr<const Surfaces> surfaces_;
   std::shared_ptr<const detail::BakedLight> light_;
   double lightSeconds_ = 0;
 };

@@ -1,10 +1,10 @@
 // What a marcher needs to know about a density before the first ray.
 //
-// Empty space: for every brick the Chebyshev distance to the nearest occupied one. It is exact after one
-// forward and one backward pass per axis, since the distance is a maximum over axes and the passes take it
-// one axis at a time: the minimum over y of max(|y|, d(y)) only needs d to be known along the axes done
-// before. A ray then leaves whole boxes of empty bricks in one step, so that its cost follows what is there
-// and not how finely the box around it is divided.
+// Empty space: for every brick the Chebyshev distance to the nearest occupied one, and for constant ones to
+// the nearest other. It is exact after one forward and one backward pass per axis, since the distance is a
+// maximum over axes and the passes take it one axis at a time: the minimum over y of max(|y|, d(y)) only
+// needs d to be known along the axes done before. A ray then leaves whole boxes of empty bricks in one step,
+// so that its cost follows what is there and not how finely the box around it is divided.
 //
 // Bounds: a brick whose six neighbours are full lies inside the hull of the rest, so only the others are
 // looked into.
@@ -18,12 +18,41 @@
 
 #include "modeling/error.h"
 #include "modeling/parallel.h"
+#include "render/field_density.h"
 
 namespace nephele {
 
 namespace {
 // Bricks that a ray may leave behind at once; more would cost the passes more than it saves the rays.
 constexpr std::uint8_t kFarthest = 32;
+
+// Lowers entries of a table of `n` entries to their distance from the nearest that is 0, if that is less.
+void spread(std::vector<std::uint8_t>& distances, const Vec3i& n) {
+  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
+  for (int axis = 0; axis != 3; ++axis) {
+    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
+    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
+      std::vector<int> line(along), nearest(along);
+      for (std::size_t j = begin; j != end; ++j)
+        for (int i = 0; i != n[a]; ++i) {
+          std::uint8_t* start = distances.data() + j * stride[b] + std::size_t(i) * stride[a];
+          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
+          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
+          // can improve.
+          for (int k = 0; k != along; ++k) {
+            int best = line[k];
+            for (int step = 1; step < best; ++step) {
+              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
+              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
+            }
+            nearest[k] = best;
+          }
+          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
+        }
+    });
+  }
+}
+
 }  // namespace
 
 RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour)
@@ -31,9 +60,9 @@ RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColou
   require(density_ != nullptr, "render volume: no density given");
   require(!density_->isPacked(), "render volume: the density must not be packed");
   const BrickGrid& grid = *density_;
-  require(
-      grid.background == 0.0f,
-      fmt::format("density: expected 0 outside of the volume, but its background is {}", grid.background));
+  require(grid.background == 0.0f,
+          fmt::format("density: expected 0 outside of the volume, but its background is {}{}",
+                      grid.background, grid.background > 0 ? "; is it a level set?" : ""));
   require(grid.values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
           fmt::format(
               "density: {} distinct bricks are more than the {} that can be marched; use a larger voxel size",
@@ -41,13 +70,39 @@ RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColou
   for (const Interval& range : grid.ranges)
     require(std::isfinite(range.min) && std::isfinite(range.max),
             "density: contains values that are not finite");
+  // Extinctions and optical depths are floats, too.
+  constexpr float most = 1e18f;
+  for (const Interval& range : grid.ranges)
+    require(range.max <= most && range.min >= -most,
+            fmt::format("density: expected values up to {:g}, got {:g}", most,
+                        range.max > most ? range.max : range.min));
   checkColour(colour_.scattering, "colour");
   checkColour(colour_.emission, "emission");
   findOccupied();
   measureColour();
   if (isEmpty()) return;
   measureEmptiness();
+  measureUniformity();
   measureBounds();
+  const Vec3f reach =
+      max(max(worldBounds().max, -worldBounds().max), max(worldBounds().min, -worldBounds().min));
+  const float farthest = std::max({reach.x, reach.y, reach.z});
+  require(
+      farthest < 2e6f * grid.voxelSize,
+      fmt::format("density: stands {:g} from the origin, where voxels of {:g} can no longer be told apart; "
+                  "move it nearer",
+                  farthest, grid.voxelSize));
+}
+
+RenderVolume RenderVolume::ofField(std::shared_ptr<const BrickGrid> density,
+                                   std::shared_ptr<const FieldDensity> field) {
+  require(field != nullptr, "render volume: no field given");
+  RenderVolume volume(std::move(density));
+  require(!volume.isEmpty() || field->isEmpty(),
+          fmt::format("render volume: nothing of the field is found with voxels of {}; use smaller ones",
+                      volume.density().voxelSize));
+  volume.field_ = std::move(field);
+  return volume;
 }
 
 void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* name) const {
@@ -110,34 +165,25 @@ void RenderVolume::findOccupied() {
 }
 
 void RenderVolume::measureEmptiness() {
-  const BrickGrid& grid = *density_;
-  emptiness_.assign(grid.table.size(), kFarthest);
-  for (const Vec3i& brick : occupied_) emptiness_[grid.tableIndex(brick)] = 0;
+  emptiness_.assign(density_->table.size(), kFarthest);
+  for (const Vec3i& brick : occupied_) emptiness_[density_->tableIndex(brick)] = 0;
+  spread(emptiness_, density_->brickCount);
+}
 
-  const Vec3i n = grid.brickCount;
-  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
-  for (int axis = 0; axis != 3; ++axis) {
-    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
-    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
-      std::vector<int> line(along), nearest(along);
-      for (std::size_t j = begin; j != end; ++j)
-        for (int i = 0; i != n[a]; ++i) {
-          std::uint8_t* start = emptiness_.data() + j * stride[b] + std::size_t(i) * stride[a];
-          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
-          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
-          // can improve.
-          for (int k = 0; k != along; ++k) {
-            int best = line[k];
-            for (int step = 1; step < best; ++step) {
-              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
-              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
-            }
-            nearest[k] = best;
-          }
-          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
-        }
-    });
-  }
+void RenderVolume::measureUniformity() {
+  const BrickGrid& grid = *density_;
+  std::vector<std::size_t> places(grid.poolSize());
+  for (const std::int32_t pool : grid.table) ++places[std::size_t(pool)];
+  std::size_t constant = 0;
+  for (std::size_t pool = 0; pool != places.size(); ++pool)
+    if (grid.ranges[pool].isPoint() && grid.ranges[pool].max > 0 &&
+        (constant == 0 || places[pool] > places[constant]))
+      constant = pool;
+  uniformity_.assign(grid.table.size(), 0);
+  if (constant == 0) return;
+  for (std::size_t entry = 0; entry != grid.table.size(); ++entry)
+    if (std::size_t(grid.table[entry]) == constant) uniformity_[entry] = kFarthest;
+  spread(uniformity_, grid.brickCount);
 }
 
 void RenderVolume::measureBounds() {
@@ -240,11 +286,12 @@ float RenderVolume::typicalDensity() const {
 }
 
 std::size_t RenderVolume::memoryBytes() const {
-  std::size_t colours = 0;
+  std::size_t others = 0;
   for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
-    for (const auto& grid : *grids) colours += grid ? grid->memoryBytes() : 0;
-  return density_->memoryBytes() + colours + emptiness_.size() + occupied_.size() * sizeof(Vec3i) +
-         outline_.size() * sizeof(Vec3f);
+    for (const auto& grid : *grids) others += grid ? grid->memoryBytes() : 0;
+  if (field_) others += field_->memoryBytes();
+  return density_->memoryBytes() + others + emptiness_.size() + uniformity_.size() +
+         occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
 }
 
 }  // namespace nephele

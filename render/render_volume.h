@@ -11,6 +11,8 @@
 
 namespace nephele {
 
+class FieldDensity;
+
 /// What a density may hold beside itself, on bricks laid out as its own: three grids of the same table, or
 /// nulls. Values below zero count as zero.
 struct VolumeColour {
@@ -35,7 +37,14 @@ class RenderVolume {
   /// million distinct ones, 8.5 GB), or colours are laid out in another way.
   explicit RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour = {});
 
+  /// A density that rays ask a field for; `density` stands for it wherever light is worked out beforehand.
+  /// @throws Error if the grid is empty and the field is not, since then nothing would be lit; and as above.
+  static RenderVolume ofField(std::shared_ptr<const BrickGrid> density,
+                              std::shared_ptr<const FieldDensity> field);
+
   const BrickGrid& density() const { return *density_; }
+  /// Null where the grid is all there is.
+  const FieldDensity* field() const { return field_.get(); }
   const VolumeColour& colour() const { return colour_; }
   bool hasColour() const { return colour_.scattering[0] != nullptr; }
   bool hasEmission() const { return colour_.emission[0] != nullptr; }
@@ -56,6 +65,10 @@ class RenderVolume {
   /// that holds density: 0 in one, saturating at 32. A ray may leave the box of radius distance - 1 around an
   /// entry unseen.
   std::span<const std::uint8_t> emptiness() const { return emptiness_; }
+  /// The same distance to the nearest brick that is not the same constant, for bricks of the constant that
+  /// fills most bricks; 0 in all others. A ray may cross the box of radius distance - 1 around an entry
+  /// without looking at it.
+  std::span<const std::uint8_t> uniformity() const { return uniformity_; }
 
   /// Box of the bricks that hold density, in voxels.
   const Box& indexBounds() const { return indexBounds_; }
@@ -71,13 +84,15 @@ class RenderVolume {
   bool isOccupied(std::size_t entry) const;
   void findOccupied();
   void measureEmptiness();
+  void measureUniformity();
   void measureBounds();
 
   std::shared_ptr<const BrickGrid> density_;
   VolumeColour colour_;
+  std::shared_ptr<const FieldDensity> field_;
   Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;
-  std::vector<std::uint8_t> emptiness_;
+  std::vector<std::uint8_t> emptiness_, uniformity_;
   std::vector<Vec3f> outline_;
   Box indexBounds_, worldBounds_;
   float maxDensity_ = 0.0f;

@@ -34,6 +34,10 @@ std::vector<SubSample> pixelPattern(int count, std::uint64_t seed) {
   for (int i = 0; i != count; ++i)
     pattern.push_back({0.5 + tent(fraction(0.5 + shift + a * (i + 1))),
                        0.5 + tent(fraction(0.5 + shift + b * (i + 1))), fraction(shift + c * (i + 1))});
+  // Few points do not lie evenly around the centre, which would move the picture by a part of a pixel.
+  double meanX = 0, meanY = 0;
+  for (const SubSample& sub : pattern) meanX += sub.x / count, meanY += sub.y / count;
+  for (SubSample& sub : pattern) sub.x += 0.5 - meanX, sub.y += 0.5 - meanY;
   // Every part of a step once: the order comes from the lattice, the places are even.
   std::vector<int> order(pattern.size());
   for (std::size_t i = 0; i != order.size(); ++i) order[i] = int(i);

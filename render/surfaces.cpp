@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -68,9 +69,18 @@ Vec3f texel(const Image& image, double u, double v) {
   return result;
 }
 
+std::size_t meshBytes(const Mesh& mesh) {
+  std::size_t bytes = mesh.positions.size() * sizeof(Vec3d) +
+                      (mesh.corners.size() + mesh.faceStart.size()) * sizeof(std::uint32_t);
+  for (const MeshAttribute& attribute : mesh.attributes) bytes += attribute.values.size() * sizeof(float);
+  return bytes;
+}
+
 }  // namespace
 
 struct Surfaces::Scene {
+  // What Embree holds; in front of what frees it.
+  std::atomic<std::ptrdiff_t> bytes{0};
   RTCDevice device = nullptr;
   RTCScene seen = nullptr, shading = nullptr;
   Vec3d centre;
@@ -115,12 +125,20 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects)
       box_.min[axis] = i == 0 ? box.min[axis] : std::min(box_.min[axis], box.min[axis]);
       box_.max[axis] = i == 0 ? box.max[axis] : std::max(box_.max[axis], box.max[axis]);
     }
+    if (object.castsShadows) shadeBox_ = shadeBox_.including(box);
   }
   Scene& scene = *scene_;
   scene.centre = (Vec3d(box_.min) + Vec3d(box_.max)) * 0.5;
   clearance_ = 1e-5 * double(std::max(box_.longestSide(), 1e-30f));
   scene.device = rtcNewDevice(nullptr);
   require(scene.device != nullptr, "objects: Embree cannot be started");
+  rtcSetDeviceMemoryMonitorFunction(
+      scene.device,
+      [](void* counter, ssize_t bytes, bool) {
+        *static_cast<std::atomic<std::ptrdiff_t>*>(counter) += bytes;
+        return true;
+      },
+      &scene.bytes);
   scene.seen = rtcNewScene(scene.device);
   scene.shading = rtcNewScene(scene.device);
   rtcSetSceneFlags(scene.seen, RTC_SCENE_FLAG_ROBUST);
@@ -199,6 +217,41 @@ bool Surfaces::occluded(const Ray& ray, double distance) const {
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene_->shading, &context, &query);
   return query.tfar < 0;
+}
+
+double Surfaces::distanceToShade(const Ray& ray) const {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  if (!castsShadows_) return infinite;
+  RTCRayHit query{};
+  scene_->set(query.ray, ray, infinite);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene_->shading, &context, &query);
+  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? infinite : double(query.ray.tfar);
+}
+
+std::size_t Surfaces::memoryBytes() const {
+  std::size_t bytes = std::size_t(std::max<std::ptrdiff_t>(scene_->bytes, 0));
+  std::vector<const Image*> textures;
+  for (const SurfaceObject& object : objects_) {
+    bytes += meshBytes(object.mesh);
+    if (object.texture && std::ranges::count(textures, object.texture.get()) == 0)
+      textures.push_back(object.texture.get());
+  }
+  for (const std::vector<Vec3f>& normals : scene_->normals) bytes += normals.size() * sizeof(Vec3f);
+  for (const Image* texture : textures)
+    for (const Image::Channel& channel : texture->channels) bytes += channel.values.size() * sizeof(float);
+  return bytes;
+}
+
+double Surfaces::estimateBytes(const Mesh& mesh) {
+  // Embree's two trees while they are built, and their triangles.
+  constexpr double perTriangle = 400;
+  const double triangles = double(mesh.corners.size()) - 2 * double(mesh.faceCount());
+  return double(meshBytes(mesh)) + double(mesh.positions.size()) * 2 * sizeof(Vec3f) +
+         std::max(triangles, 0.0) * (perTriangle + 4 * sizeof(std::uint32_t));
 }
 
 Mesh groundPlane(const Vec3f& centre, float height, float size) {

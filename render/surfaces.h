@@ -54,9 +54,16 @@ class Surfaces {
   /// Whether anything that casts shadows is met within `distance`.
   bool occluded(const Ray& ray, double distance) const;
   bool castsShadows() const { return castsShadows_; }
+  /// The distance to the first thing that casts shadows; infinite where `ray` meets none.
+  double distanceToShade(const Ray& ray) const;
 
-  /// Of all objects.
+  /// Of all objects, and of those that cast shadows; the latter is empty where there are none.
   const Box& box() const { return box_; }
+  const Box& shadeBox() const { return shadeBox_; }
+  /// Of triangles, what rays need to find them, and textures.
+  std::size_t memoryBytes() const;
+  /// What objects of these meshes will hold, from above.
+  static double estimateBytes(const Mesh& mesh);
   /// How far a ray that leaves a surface must start from it.
   double clearance() const { return clearance_; }
 
@@ -64,7 +71,7 @@ class Surfaces {
   struct Scene;
   std::unique_ptr<Scene> scene_;
   std::vector<SurfaceObject> objects_;
-  Box box_;
+  Box box_, shadeBox_;
   double clearance_ = 0;
   bool castsShadows_ = false;
 };

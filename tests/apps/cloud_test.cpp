@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "levelset/grid_field.h"
+#include "levelset/mesh_io.h"
 #include "levelset/vdb_io.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
@@ -80,6 +81,86 @@ TEST(CloudVerb, GrowsOnALevelSetAsOnItsMesh) {
   EXPECT_NEAR(levelSet / mesh, 1.0, 0.01);
 }
 
+TEST(CloudVerb, GrowsCloudsOfEverySpeciesWithoutAnInput) {
+  const TemporaryFolder folder;
+  for (const std::string species : {"humilis", "mediocris", "congestus"}) {
+    const std::string path = folder.file(species + ".vdb");
+    const auto grown = [&](const std::string& options) {
+      const ProgramResult result =
+          runProgram("cloud --species " + species + " -o " + path + " --resolution 32 --layers 1 " + options);
+      EXPECT_EQ(result.exitCode, 0) << species << options << ": " << result.errors;
+      return toBricks(readScalarGrid(path, "density"));
+    };
+    const auto first = grown("--shape-seed 7"), again = grown("--shape-seed 7 --threads 1");
+    EXPECT_EQ(first->values, again->values);
+    EXPECT_NE(first->values, grown("--shape-seed 8")->values);
+    // Standard flat base: no density below 1 % of the longest side, 1 world unit; voxels of 1/32.
+    const auto full = grown("--shape-seed 7 --flat-base off");
+    double below = 0, belowWithout = 0;
+    for (int k = -20; k <= 20; ++k)
+      for (int j = -20; j <= 0; ++j)
+        for (int i = -20; i <= 20; ++i) {
+          below += first->at({i, j, k});
+          belowWithout += full->at({i, j, k});
+        }
+    EXPECT_EQ(below, 0) << species;
+    EXPECT_GT(belowWithout, 0) << species;
+  }
+}
+
+TEST(CloudVerb, WritesTheShapeThatItGrowsOn) {
+  const TemporaryFolder folder;
+  const ProgramResult result =
+      runProgram("cloud --species humilis --shape-seed 3 --shape-size 50 --resolution 24 --layers 1 -o " +
+                 folder.file("out.vdb") + " --shape-mesh " + folder.file("shape.obj"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Box box = boundingBox(readMesh(folder.file("shape.obj")));
+  EXPECT_NEAR(box.longestSide(), 50, 1.5);
+  EXPECT_LT(box.size().y, 0.5f * box.longestSide());
+}
+
+TEST(CloudVerb, ShapesTheDensityAsAsked) {
+  const TemporaryFolder folder;
+  const auto grown = [&](const std::string& options) {
+    const std::string path = folder.file("out.vdb");
+    const ProgramResult result =
+        runProgram("cloud " + kSphere + " -o " + path +
+                   " --voxel-size 0.05 --layers 1 --amplitude 0 --edge-thickness 0.1 " + options);
+    EXPECT_EQ(result.exitCode, 0) << options << ": " << result.errors;
+    return toBricks(readScalarGrid(path, "density"));
+  };
+  // The unit sphere: heights 0 and 1 are y = -1 and 1. Voxel j lies at y = j / 20.
+  EXPECT_NEAR(grown("--height-profile 0:1,0.5:0.5,1:0")->at({0, 5, 0}), 0.375, 1e-5);
+  EXPECT_NEAR(grown("--thin-out 0.6")->at({0, 10, 0}), 0.7, 1e-5);
+  EXPECT_EQ(grown("--thin-out 0.6,0.8")->at({0, 10, 0}), 1);
+  const auto cut = grown("--flat-base -0.5,0.2");
+  EXPECT_EQ(cut->at({0, -10, 0}), 0);
+  EXPECT_NEAR(cut->at({0, -8, 0}), 0.5, 1e-5);
+  EXPECT_EQ(cut->at({0, -5, 0}), 1);
+  // Of the longest side, 2, above the lowest point, -1: no density below y = -0.5.
+  EXPECT_NEAR(grown("--flat-base 25%,10%")->at({0, -8, 0}), 0.5, 1e-5);
+  // At the surface t = 1/2 (the mesh is within 0.01 of the sphere, a tenth of the edge).
+  EXPECT_NEAR(grown("--edge-falloff 2")->at({0, 20, 0}), 0.25, 0.1);
+  EXPECT_NEAR(grown("--edge-falloff linear")->at({0, 20, 0}), 0.5, 0.1);
+  const auto noisy = grown("--interior-noise 0.5,3");
+  float least = 10, most = 0;
+  for (int i = -10; i <= 10; ++i) {
+    least = std::min(least, noisy->at({i, 0, 0}));
+    most = std::max(most, noisy->at({i, 0, 0}));
+  }
+  EXPECT_GE(least, 0);
+  EXPECT_LT(least, 0.8f);
+  EXPECT_GT(most, 1.2f);
+}
+
+TEST(CloudVerb, NeedsAShapeFromOneSource) {
+  const ProgramResult neither = runProgram("cloud -o unused.vdb");
+  EXPECT_EQ(neither.exitCode, 2);
+  EXPECT_NE(neither.errors.find("--species"), std::string::npos) << neither.errors;
+  EXPECT_EQ(runProgram("cloud " + kSphere + " --species humilis -o unused.vdb").exitCode, 2);
+  EXPECT_EQ(runProgram("cloud " + kSphere + " --shape-seed 3 -o unused.vdb").exitCode, 2);
+}
+
 TEST(CloudVerb, WithoutAmplitudeIsTheMesh) {
   const TemporaryFolder folder;
   const ProgramResult result =
@@ -127,10 +208,40 @@ TEST(CloudVerb, WorksAtResolutionOne) {
 }
 
 TEST(CloudVerb, BadOptionsAreUsageErrorsThatNameThem) {
-  for (const std::string bad :
-       {"--layers 0", "--layers 99", "--amplitude -1%", "--frequency 0x", "--billow -0.5", "--billow nan",
-        "--noise simplex", "--renormalise maybe", "--medial-smoothing 17", "--edge-thickness 0",
-        "--voxel-size 0", "--resolution 0", "--advect 1"}) {
+  for (const std::string bad : {"--layers 0",
+                                "--layers 99",
+                                "--amplitude -1%",
+                                "--frequency 0x",
+                                "--billow -0.5",
+                                "--billow nan",
+                                "--noise simplex",
+                                "--renormalise maybe",
+                                "--medial-smoothing 17",
+                                "--edge-thickness 0",
+                                "--voxel-size 0",
+                                "--resolution 0",
+                                "--species nimbus",
+                                "--edge-falloff 0",
+                                "--edge-falloff steep",
+                                "--edge-falloff 11",
+                                "--interior-noise -1",
+                                "--interior-noise 0.5,",
+                                "--interior-noise 0.5,0x",
+                                "--interior-noise 3",
+                                "--flat-base",
+                                "--flat-base high",
+                                "--flat-base 1%,0",
+                                "--flat-base 1,2,3",
+                                "--height-profile 0",
+                                "--height-profile 1:1,0:1",
+                                "--height-profile 0:-1",
+                                "--height-profile 0:1,",
+                                "--thin-out 1.5",
+                                "--thin-out 0.5,1",
+                                "--thin-out nan",
+                                "--shape-mesh shape.vdb",
+                                "--advect -1%",
+                                "--advect-steps 0"}) {
     const ProgramResult result = runProgram("cloud " + kSphere + " -o unused.vdb " + bad);
     EXPECT_EQ(result.exitCode, 2) << bad;
     EXPECT_NE(result.errors.find(bad.substr(0, bad.find(' '))), std::string::npos)

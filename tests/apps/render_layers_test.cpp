@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "levelset/vdb_io.h"
@@ -220,6 +221,46 @@ TEST_F(RenderLayers, RefuseWhatCannotBe) {
   EXPECT_EQ(other.exitCode, 1);
   EXPECT_NE(other.errors.find("32x24"), std::string::npos) << other.errors;
   EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST_F(RenderLayers, DeepPicturesFlattenToThePictureInAnotherProgram) {
+  if (std::system("command -v oiiotool >/dev/null 2>&1") != 0)
+    GTEST_SKIP() << "the program oiiotool is not installed (package openimageio-tools)";
+  const TemporaryFolder folder;
+  ASSERT_EQ(
+      runProgram(start() + folder.file("a.exr") + " --extinction 4 --aov none --deep " + folder.file("d.exr"))
+          .exitCode,
+      0);
+  const std::string command = "oiiotool '" + folder.file("d.exr") + "' --flatten --ch R,G,B,A -d half -o '" +
+                              folder.file("flat.exr") + "' >/dev/null 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const Image image = readImage(folder.file("a.exr")), flat = readImage(folder.file("flat.exr"));
+  ASSERT_EQ(flat.width, 32);
+  // Samples of 16 bit, whose roundings are made up for by the next one.
+  for (const char* name : {"R", "G", "B", "A"})
+    for (int y = 0; y != 24; ++y)
+      for (int x = 0; x != 32; ++x) {
+        ASSERT_NEAR(flat.at(name, x, y), image.at(name, x, y), 1e-3f * (1 + image.at(name, x, y)));
+      }
+}
+
+TEST_F(RenderLayers, NeitherPictureIsThereWhereTheDeepOneCannotBeWritten) {
+  const TemporaryFolder folder;
+  const std::string arguments = start() + folder.file("a.exr") + " --aov none --extinction 4" +
+                                " --deep " + folder.file("d.exr");
+  ASSERT_EQ(runProgram(arguments).exitCode, 0);
+  const auto flat = std::filesystem::file_size(folder.file("a.exr")),
+             deep = std::filesystem::file_size(folder.file("d.exr"));
+  // In units of 512 bytes: room for the flat one only.
+  const std::uintmax_t limit = flat / 512 + 1;
+  ASSERT_GT(deep, limit * 512);
+  std::filesystem::remove(folder.file("a.exr"));
+  std::filesystem::remove(folder.file("d.exr"));
+  const ProgramResult result = runProgram(arguments, "ulimit -f " + std::to_string(limit) + ";");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("d.exr"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 0u);
+  EXPECT_EQ(runProgram(start() + folder.file("a.exr") + " --deep " + folder.file("a.exr")).exitCode, 2);
 }
 
 }  // namespace

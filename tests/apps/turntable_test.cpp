@@ -210,6 +210,79 @@ TEST_F(TurntableVerb, SkipsWithoutMakingLightAndAddsMissingPreviews) {
   EXPECT_EQ(statistics()["rays"], 0);
 }
 
+TEST_F(TurntableVerb, SkipsOnlyWhatWasMadeWithTheSameOptionsOfTheSameInput) {
+  const std::string input = folder.file("in.vdb");
+  fs::copy_file(data_->file("club.vdb"), input);
+  const auto skipped = [&](const std::string& options) {
+    const ProgramResult result = runProgram(
+        fmt::format("turntable '{}' -o '{}' --size 16x12 --samples 1 --skip-existing --stats '{}' {}", input,
+                    folder.file("f.####.exr"), folder.file("s.json"), options));
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    int count = 0;
+    const auto stats = statistics();
+    for (const auto& entry : stats["frames"]) count += entry["skipped"] == true;
+    if (count == 0 && fs::exists(folder.file("once"))) {
+      EXPECT_NE(result.errors.find("other options"), std::string::npos) << options << result.errors;
+    }
+    std::ofstream(folder.file("once")) << "x";
+    return count;
+  };
+  EXPECT_EQ(skipped("--frames 1-3"), 0);
+  // What says where files go, how many frames are made and by how many threads does not count.
+  EXPECT_EQ(skipped("--frames 1-3 --threads 1 --exposure 1 --preview '" + folder.file("v.#.png") + "'"), 3);
+  EXPECT_EQ(skipped("--frames 1-3x2"), 2);
+  EXPECT_EQ(skipped("--frames 1-3 --only 2"), 1);
+  EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 0);
+  EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 3);
+  // A turn of other frames has them elsewhere.
+  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 0);
+  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 3);
+  // The same file elsewhere is the same; another of its name is not.
+  const std::string other = folder.file("other.vdb");
+  fs::rename(input, other);
+  fs::copy_file(other, input);
+  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 3);
+  fs::copy_file(data_->file("ball.vdb"), input, fs::copy_options::overwrite_existing);
+  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 0);
+}
+
+TEST_F(TurntableVerb, ObjectsStandBesideTheVolumeInEveryOrbit) {
+  std::ofstream(folder.file("wall.obj")) << "v 1 -2 -2\nv 1 2 -2\nv 1 0 2\nf 1 2 3\n";
+  const std::string common = " --object '" + folder.file("wall.obj") + "' --ground --backdrop " +
+                             "--camera-position 0,1,6 --look-at 0,0,0 --extinction 10 ";
+  ASSERT_EQ(runProgram("render " + volume("club.vdb") + " -o '" + folder.file("r.exr") +
+                       "' --size 64x36 --samples 1" + common)
+                .exitCode,
+            0);
+  const Image still = readImage(folder.file("r.exr"));
+  for (const char* orbit : {"camera", "model", "light"}) {
+    const ProgramResult result = runProgram(call("--frames 1-2 --orbit " + std::string(orbit) + common));
+    ASSERT_EQ(result.exitCode, 0) << orbit << result.errors;
+    const Image first = readImage(frame(1));
+    for (const char* name : {"R", "B", "A", "backdrop.G"})
+      EXPECT_EQ(first.channel(name).values, still.channel(name).values) << orbit;
+    EXPECT_NE(readImage(frame(2)).channel("R").values, still.channel("R").values) << orbit;
+  }
+  // Half a turn of the lights: the sun stands on the other side of the wall, as in a picture of its own.
+  ASSERT_EQ(runProgram("render " + volume("club.vdb") + " -o '" + folder.file("r.exr") +
+                       "' --size 64x36 --samples 1 --sun 270,38" + common)
+                .exitCode,
+            0);
+  const Image turned = readImage(folder.file("r.exr")), second = readImage(frame(2));
+  for (std::size_t i = 0; i != turned.channel("R").values.size(); ++i)
+    ASSERT_NEAR(second.channel("R").values[i], turned.channel("R").values[i], 2e-3f);
+  const ProgramResult refused = runProgram(call("--frames 1-2 --integrator path --ground"));
+  EXPECT_EQ(refused.exitCode, 2) << refused.errors;
+}
+
+TEST_F(TurntableVerb, MakesDeepShadowMapsAnewForLightsThatTurn) {
+  // A ball looks the same from all sides.
+  ASSERT_EQ(runProgram(call("--frames 1-4 --orbit model --extinction 5 --shadows deep", "ball.vdb")).exitCode,
+            0);
+  for (int number = 2; number <= 4; ++number)
+    EXPECT_NEAR(brightness(frame(number)), brightness(frame(1)), 0.03 * brightness(frame(1)));
+}
+
 TEST_F(TurntableVerb, ShardsTogetherMakeAllFrames) {
   for (int shard = 1; shard <= 3; ++shard) {
     const ProgramResult result = runProgram(call("--frames 1-7 --shard " + std::to_string(shard) + "/3"));
@@ -343,7 +416,8 @@ TEST_F(TurntableVerb, EndsCleanlyOnSignalsAndResumes) {
 
     const ProgramResult rest =
         runProgram(call("--frames 1-2000 --skip-existing --only 1-" + std::to_string(count + 2) +
-                        " --stats '" + folder.file("s.json") + "'"));
+                            " --stats '" + folder.file("s.json") + "'",
+                        "club.vdb", 64));
     EXPECT_EQ(rest.exitCode, 0) << rest.errors;
     int skipped = 0;
     const auto stats = statistics();

@@ -1,6 +1,7 @@
 // Perlin noise: the scalar truth against lanes, on random points (every point in another cell) and on
 // coherent ones (along rows of a fine grid). The usual scalar code, with a table of permutations, stands
-// beside them as the loop that others would write. Items per second are points.
+// beside them as the loop that others would write. Then every kind of noise, still and moving, with and
+// without gradient: the truth, one point at a time, and lanes of random points. Items per second are points.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -8,8 +9,11 @@
 #include <random>
 #include <vector>
 
+#include "modeling/lattice_noise.h"
 #include "modeling/noise.h"
 #include "modeling/noise_kernels.h"
+#include "modeling/noises.h"
+#include "modeling/spectral_noise.h"
 
 namespace nephele {
 namespace {
@@ -118,7 +122,87 @@ void batchedWithGradient(benchmark::State& state, bool coherent) {
 BENCHMARK_CAPTURE(batchedWithGradient, random, false);
 BENCHMARK_CAPTURE(batchedWithGradient, coherent, true);
 
+constexpr detail::PerlinLattice kLattice{Mat3f::identity(), {}, 1};
+
+/// Calls `scalar(point, gradient or null)` for each point, as a loop would.
+template <class Scalar>
+void perPoint(benchmark::State& state, bool gradient, const Scalar& scalar) {
+  Data data(false);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      Vec3f g;
+      data.values[i] = scalar(Vec3f{data.x[i], data.y[i], data.z[i]}, gradient ? &g : nullptr);
+      data.gx[i] = g.x, data.gy[i] = g.y, data.gz[i] = g.z;
+    }
+    benchmark::DoNotOptimize(data.values.data());
+    benchmark::DoNotOptimize(data.gx.data());
+  }
+  state.SetItemsProcessed(state.iterations() * std::int64_t(kPoints));
+}
+
+const detail::SpectralTile& tile() {
+  const SpectrumOptions s;
+  static const detail::SpectralTile made =
+      detail::synthesise({s.exponent, s.lowest, s.highest, s.tile, s.resolution}, 1, 0, 0);
+  return made;
+}
+
+void everyKindScalar(benchmark::State& state, NoiseKind kind, bool moves, bool gradient) {
+  if (kind == NoiseKind::spectral)
+    return perPoint(state, gradient,
+                    [&](const Vec3f& p, Vec3f* g) { return detail::spectralScalar(tile(), kLattice, p, g); });
+  using detail::LatticeKind;
+  constexpr LatticeKind kinds[] = {LatticeKind::perlin,           LatticeKind::simplex, LatticeKind::worley,
+                                   LatticeKind::worleyDifference, LatticeKind::value,   LatticeKind::gabor};
+  const detail::LatticeNoise noise{kinds[int(kind)], kLattice, moves, detail::noiseClock(1.5f, 0)};
+  perPoint(state, gradient,
+           [&](const Vec3f& p, Vec3f* g) { return detail::latticeNoiseScalar(noise, p, g); });
+}
+
+void everyKindLanes(benchmark::State& state, NoiseKind kind, bool moves, bool gradient) {
+  Data data(false);
+  NoiseOptions options{.kind = kind};
+  if (moves) options.time = 1.5f;
+  const ScalarField field = noise(options);
+  for (auto _ : state) {
+    if (gradient) {
+      field.evalGrad(data.points(), data.values, {{data.gx, data.gy, data.gz}});
+    } else {
+      field.eval(data.points(), data.values);
+    }
+    benchmark::DoNotOptimize(data.values.data());
+  }
+  state.SetItemsProcessed(state.iterations() * std::int64_t(kPoints));
+}
+
+/// One tile at the default resolution; items are nodes.
+void synthesis(benchmark::State& state) {
+  std::uint32_t seed = 0;
+  const SpectrumOptions s;
+  for (auto _ : state) {
+    const auto made =
+        detail::synthesise({s.exponent, s.lowest, s.highest, s.tile, s.resolution}, ++seed, 0, 0);
+    benchmark::DoNotOptimize(made.coefficients.data());
+  }
+  state.SetItemsProcessed(state.iterations() * std::int64_t(s.resolution) * s.resolution * s.resolution);
+}
+BENCHMARK(synthesis)->Unit(benchmark::kMillisecond);
+
 }  // namespace
 }  // namespace nephele
 
-BENCHMARK_MAIN();
+int main(int argumentCount, char** arguments) {
+  using namespace nephele;
+  for (const NoiseKind kind : noiseKinds())
+    for (const bool moves : {false, true})
+      for (const bool gradient : {false, true}) {
+        // The tile of another time costs the same.
+        if (kind == NoiseKind::spectral && moves) continue;
+        const std::string name = std::string(noiseName(kind)) + (moves ? "/moving" : "/still") +
+                                 (gradient ? "/gradient" : "/value");
+        benchmark::RegisterBenchmark(("scalar/" + name).c_str(), everyKindScalar, kind, moves, gradient);
+        benchmark::RegisterBenchmark(("lanes/" + name).c_str(), everyKindLanes, kind, moves, gradient);
+      }
+  benchmark::Initialize(&argumentCount, arguments);
+  benchmark::RunSpecifiedBenchmarks();
+}

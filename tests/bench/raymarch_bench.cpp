@@ -22,21 +22,29 @@ std::shared_ptr<BrickGrid> shell(int resolution) {
   });
 }
 
+// A cube full of smoke from `low` to 1.
+std::shared_ptr<BrickGrid> smoke(int resolution, int low) {
+  const int n = resolution / (1 - low);
+  return test::densityGrid(
+      test::voxels(1.0f / float(n)), {low * n, low * n, low * n}, {n - 1, n - 1, n - 1},
+      [](const Vec3f& p) { return 1 + std::sin(20 * p.x) * std::sin(23 * p.y) * std::sin(17 * p.z); });
+}
+
 // Rays of a 64 x 64 picture through a shell, for the kernels alone.
 struct Rays {
-  std::shared_ptr<const BrickGrid> grid = shell(128);
+  std::shared_ptr<const BrickGrid> grid;
   RenderVolume volume{grid};
   LightVolume light{volume, {0.3f, 0.8f, 0.4f}};
   MarchScene scene;
   std::vector<MarchRay> rays;
   std::vector<MarchResult> results;
 
-  explicit Rays(float extinction) {
+  Rays(std::shared_ptr<const BrickGrid> density, int octaves, float extinction) : grid(std::move(density)) {
     scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
     scene.ranges = grid->ranges.data();
     scene.emptiness = volume.emptiness().data();
     scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
-    scene.octaves = 3;
+    scene.octaves = octaves;
     scene.attenuation[1] = 0.9f, scene.attenuation[2] = 0.7f;
     scene.extinction = extinction;
     scene.step = scene.uniformStep = grid->voxelSize;
@@ -58,8 +66,7 @@ struct Rays {
 };
 
 template <class March>
-void march(benchmark::State& state, March&& kernel) {
-  Rays rays(float(state.range(0)));
+void march(benchmark::State& state, Rays rays, March&& kernel) {
   std::int64_t samples = 0;
   for (auto _ : state) {
     kernel(rays.scene, rays.rays, rays.results);
@@ -69,12 +76,19 @@ void march(benchmark::State& state, March&& kernel) {
 }
 
 void marchVectors(benchmark::State& state) {
-  march(state, [](const auto& scene, const auto& rays, auto& results) { marchRays(scene, rays, results); });
+  march(state, {shell(128), 3, float(state.range(0))},
+        [](const auto& scene, const auto& rays, auto& results) { marchRays(scene, rays, results); });
 }
 void marchScalar(benchmark::State& state) {
-  march(state,
+  march(state, {shell(128), 3, float(state.range(0))},
         [](const auto& scene, const auto& rays, auto& results) { marchRaysScalar(scene, rays, results); });
 }
+// Thin smoke that fits into the caches, single scattering: what a sample costs at least.
+void marchTile(benchmark::State& state) {
+  march(state, {smoke(64, -1), 1, 0.1f},
+        [](const auto& scene, const auto& rays, auto& results) { marchRays(scene, rays, results); });
+}
+BENCHMARK(marchTile)->Unit(benchmark::kMillisecond);
 BENCHMARK(marchVectors)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(marchScalar)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 
@@ -85,6 +99,17 @@ void sunOfAShell(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * std::int64_t(volume.occupiedBricks().size()));
 }
 BENCHMARK(sunOfAShell)->Arg(64)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// A cube full of smoke. Items: voxels.
+void sunOfSmoke(benchmark::State& state) {
+  const int n = int(state.range(0));
+  const RenderVolume volume(smoke(n, 0));
+  // Once before: virtual machines may take ten times as long for memory that was never touched.
+  benchmark::DoNotOptimize(LightVolume(volume, {0.3f, 0.8f, 0.4f}));
+  for (auto _ : state) benchmark::DoNotOptimize(LightVolume(volume, {0.3f, 0.8f, 0.4f}));
+  state.SetItemsProcessed(state.iterations() * n * n * n);
+}
+BENCHMARK(sunOfSmoke)->Arg(128)->Arg(256)->Arg(512)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void pictureOfAShell(benchmark::State& state) {
   const RenderVolume volume(shell(int(state.range(0))));

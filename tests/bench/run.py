@@ -117,6 +117,18 @@ def growth(nephele, mesh, folder):
     return table(["verb", "resolution", "active voxels", "time", "per active voxel", "peak memory"], rows), series
 
 
+def against_cycles(nephele, folder):
+    """One scattering in a fog, by compare_cycles.py."""
+    fog = os.path.join(os.path.dirname(SOURCE), "shared/data/volumes/wdas_cloud_sixteenth_fog.vdb")
+    missing = [name for name in ("blender", "oiiotool", "vdb_print") if not shutil.which(name)]
+    if missing or not os.path.exists(fog):
+        return f"Skipped: {', '.join(missing) or fog} is missing.\n"
+    print("against Cycles", file=sys.stderr)
+    script = os.path.join(SOURCE, "tests/bench/compare_cycles.py")
+    return subprocess.run([sys.executable, script, os.path.abspath(nephele), os.path.join(folder, "cycles"), "--fog", fog, "--only",
+                           "single"], capture_output=True, text=True, check=True).stdout
+
+
 def plot(series, path):
     """A log-log plot as SVG."""
     import math
@@ -169,11 +181,13 @@ def main():
         programs = whole_program(nephele, mesh, folder)
         print("growth", file=sys.stderr)
         growth_table, series = growth(nephele, mesh, folder)
+        cycles = against_cycles(nephele, folder)
     plot(series, os.path.join(arguments.results, "growth.svg"))
     report = "\n".join([
         f"Machine: {processor()}, {os.cpu_count()} cores. Mesh: {os.path.basename(mesh)}. Release build (-O3, no "
         "-march, SIMD chosen at run time).\n",
         "## Whole program against its peers\n", programs,
+        "## Rendering against Cycles\n", cycles,
         "## Cost against size\n", growth_table,
         "## Parts\n", micro(arguments.build)])
     with open(os.path.join(arguments.results, "benchmarks.md"), "w") as file:

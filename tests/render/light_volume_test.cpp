@@ -53,6 +53,24 @@ TEST(LightVolume, MeasuresTheWayThroughASlab) {
   }
 }
 
+TEST(LightVolume, IsExactAcrossALightAlongAnAxis) {
+  // Columns of equal density: linear interpolation between them is the density's own, times the length of
+  // the way to the upper end, half a voxel of which is the ramp to zero.
+  const auto densityAt = [](int x, int y) { return 0.5 + 0.5 * std::sin(2.3 * x + 1.7 * y * y); };
+  const RenderVolume volume(densityGrid(voxels(1), {-9, -9, -20}, {9, 9, 20}, [&](const Vec3f& p) {
+    return float(densityAt(int(std::lround(p.x)), int(std::lround(p.y))));
+  }));
+  const LightVolume light(volume, {0, 0, 1});
+  for (int i = 0; i != 200; ++i) {
+    const double x = 6 * std::sin(i * 1.3), y = 6 * std::sin(i * 2.1 + 1);
+    const int z = i % 16 - 10, u = int(std::floor(x)), v = int(std::floor(y));
+    const double fx = x - u, fy = y - v;
+    const double density = (1 - fy) * ((1 - fx) * densityAt(u, v) + fx * densityAt(u + 1, v)) +
+                           fy * ((1 - fx) * densityAt(u, v + 1) + fx * densityAt(u + 1, v + 1));
+    EXPECT_NEAR(light.columnDensity({float(x), float(y), float(z)}), density * (20.5 - z), 1e-4) << i;
+  }
+}
+
 TEST(LightVolume, BricksAgreeOnTheNodesTheyShare) {
   const auto grid = densityGrid(voxels(1), {-14, -14, -14}, {17, 15, 16}, [](const Vec3f& p) {
     return std::fmax(0.0f, std::sin(0.5f * p.x) * std::cos(0.4f * p.y) + std::sin(0.3f * p.z));
@@ -137,6 +155,49 @@ TEST(LightVolume, StaysWithinItsEstimate) {
   const RenderVolume volume(ball(1.0f, 0.05f));
   for (const Vec3f& towards : {Vec3f{0, 1, 0}, Vec3f{1, 1, 1}, Vec3f{-1, 0.5f, 0.9f}})
     EXPECT_LE(double(LightVolume(volume, towards).memoryBytes()), LightVolume::estimateBytes(volume));
+}
+
+TEST(LightVolume, AddsTheShadowOfThingsToWhatIsBehindThem) {
+  // Stretched and turned, so that no axis is another's. The ball stands half in the density.
+  Affine map{Mat3f::rotation({1, 2, 3}, 0.7f), {5, 0, 0}};
+  for (int row = 0; row != 3; ++row)
+    map.linear(row, 0) *= 0.04f, map.linear(row, 1) *= 0.06f, map.linear(row, 2) *= 0.05f;
+  const RenderVolume volume(
+      densityGrid(map, {-20, -16, -18}, {20, 16, 18}, [](const Vec3f&) { return 0.5f; }));
+  const Vec3d centre{5.05, 0.1, 0.05};
+  const double radius = 0.35;
+  const Box box{Vec3f(centre) - Vec3f{1, 1, 1} * 0.35f, Vec3f(centre) + Vec3f{1, 1, 1} * 0.35f};
+  for (const Vec3f& towards : {Vec3f{0, 2, 0}, Vec3f{0, 0, -3}, Vec3f{1, 1, 1}, Vec3f{-0.2f, -0.9f, 0.3f}}) {
+    const LightVolume bare(volume, towards);
+    LightVolume shaded = bare;
+    shaded.addShade(
+        [&](const Ray& ray) { return test::distanceToBall(ray.origin, ray.direction, centre, radius); }, box,
+        towards, 0.1f);
+    int lit = 0, dark = 0;
+    for (int i = 0; i != 4000; ++i) {
+      const Vec3f p =
+          Vec3f{5, 0, 0} + Vec3f{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)} * 0.6f;
+      const float added = shaded.columnDensity(p) - bare.columnDensity(p);
+      // What a ray from p meets on its way to the light, for balls larger and smaller by a cell of
+      // the sheared lattice: the square root of 6 voxels of 0.06.
+      const auto isHidden = [&](double r) {
+        const Vec3d way = normalize(Vec3d(towards));
+        return length(Vec3d(p) - centre) < r || std::isfinite(test::distanceToBall(Vec3d(p), way, centre, r));
+      };
+      if (!isHidden(radius + 0.15)) {
+        EXPECT_EQ(added, 0.0f) << i;
+        ++lit;
+      } else if (isHidden(radius - 0.15)) {
+        EXPECT_NEAR(added, detail::kDark * 0.1f, 1e-4f) << i;
+        ++dark;
+      } else {
+        EXPECT_GE(added, -1e-5f);
+        EXPECT_LE(added, detail::kDark * 0.1f + 1e-4f);
+      }
+    }
+    EXPECT_GT(lit, 500);
+    EXPECT_GT(dark, 50);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // A volume that is lit once and looked at many times.
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "modeling/error.h"
 #include "render/raymarch.h"
 #include "tests/support/density.h"
@@ -66,6 +68,27 @@ TEST(LitVolume, RefusesOctavesOtherThanItsOwn) {
   RenderOptions options;
   const LitVolume lit(volume, {}, kLights, options.octaves);
   ++options.octaves.count;
+  EXPECT_THROW(lit.render(cameraAt(volume, 0), options), Error);
+}
+
+TEST(LitVolume, HoldsTheShadowsOfObjectsFromPictureToPicture) {
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Medium medium{10.0f};
+  Mesh wall;
+  wall.positions = {{2, -3, -3}, {2, 3, -3}, {2, 0, 3}};
+  wall.addFace(std::array<std::uint32_t, 3>{0, 1, 2});
+  RenderOptions options;
+  options.surfaces = std::make_shared<const Surfaces>(std::vector<SurfaceObject>{{wall}});
+  LitVolume lit(volume, medium, kLights, options.octaves, silent(), options.surfaces);
+  Lights moved = kLights;
+  moved.suns[0].direction = directionTowards(100, 0);
+  for (const Lights& lights : {kLights, moved}) {
+    lit = lit.underOther(lights);
+    for (const float azimuth : {0.0f, 100.0f})
+      expectSame(lit.render(cameraAt(volume, azimuth), options).image,
+                 renderImage(volume, medium, lights, cameraAt(volume, azimuth), options).image);
+  }
+  options.surfaces.reset();
   EXPECT_THROW(lit.render(cameraAt(volume, 0), options), Error);
 }
 

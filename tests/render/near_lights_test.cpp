@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "modeling/error.h"
+#include "render/light_volume.h"
 #include "render/march_kernels.h"
 #include "render/path_trace.h"
 #include "render/projected_light_volume.h"
@@ -350,6 +351,43 @@ TEST(NearLights, RefuseWhatIsAbsurd) {
   EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = "sun"; }, "'sun' is taken twice"));
   EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = "a.b"; }, "got 'a.b'"));
   EXPECT_TRUE(refused([](Lights& l) { l.locals.resize(9); }, "at most 8"));
+}
+
+TEST(ProjectedLightVolume, AddsTheShadowOfThingsToWhatIsBehindThem) {
+  const RenderVolume volume(ball(1.0f, 0.05f));
+  const Vec3d centre{0.0, 0.1, 0.1};
+  const double radius = 0.3;
+  // One face, a cone, and six faces from within the volume.
+  for (const LocalLight& light :
+       {point({0, 5, 1}), spot({0.2f, 3, 0}, {0, 0, 0}, 40, 5), point({-0.3f, -0.2f, 0.1f})}) {
+    const ProjectedLightVolume bare(volume, light);
+    ProjectedLightVolume shaded = bare;
+    shaded.addShade(
+        [&](const Ray& ray) { return test::distanceToBall(ray.origin, ray.direction, centre, radius); },
+        0.1f);
+    int lit = 0, dark = 0;
+    for (int i = 0; i != 4000; ++i) {
+      const Vec3f p = Vec3f{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)} * 0.55f;
+      const float added = shaded.columnDensity(p) - bare.columnDensity(p);
+      const Vec3d from(light.position), way = Vec3d(p) - from;
+      // As in the test of suns; the way from the light to p is as long as `way`.
+      const auto isHidden = [&](double r) {
+        return test::distanceToBall(from, normalize(way), centre, r) < length(way);
+      };
+      if (!isHidden(radius + 0.1)) {
+        EXPECT_EQ(added, 0.0f) << i;
+        ++lit;
+      } else if (isHidden(radius - 0.1) && length(Vec3d(p) - centre) < radius - 0.1) {
+        EXPECT_NEAR(added, detail::kDark * 0.1f, 1e-3f) << i;
+      } else if (isHidden(radius - 0.1) &&
+                 test::distanceToBall(from, normalize(way), centre, radius) < length(way) - 0.1) {
+        EXPECT_NEAR(added, detail::kDark * 0.1f, 1e-3f) << i;
+        ++dark;
+      }
+    }
+    EXPECT_GT(lit, 500);
+    EXPECT_GT(dark, 50);
+  }
 }
 
 }  // namespace

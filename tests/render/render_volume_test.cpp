@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "levelset/grid_field.h"
 #include "modeling/error.h"
+#include "modeling/field_ops.h"
+#include "modeling/shapes.h"
 #include "tests/support/density.h"
 
 namespace nephele {
@@ -42,6 +46,34 @@ TEST(RenderVolume, KnowsTheDistanceToTheNextDensity) {
         }
         ASSERT_EQ(int(volume.emptiness()[entry]), nearest) << x << " " << y << " " << z;
       }
+}
+
+TEST(RenderVolume, KnowsHowFarItIsConstant) {
+  // Solid but for its rim: counted against every brick of the table, as the definition says.
+  const auto grid = bakeGrid(clamp(sphere({0, 0, 0}, 50.0f), 0.0f, 1.0f),
+                             {.voxelSize = 1.0f, .box = {{-60, -60, -60}, {60, 60, 60}}, .background = 0.0f});
+  const RenderVolume volume(grid);
+  std::set<std::int32_t> constants;
+  for (std::size_t entry = 0; entry != grid->table.size(); ++entry)
+    if (volume.uniformity()[entry] != 0) constants.insert(grid->table[entry]);
+  ASSERT_EQ(constants.size(), 1u);
+  const Vec3i n = grid->brickCount;
+  int most = 0;
+  for (int z = 0; z != n.z; ++z)
+    for (int y = 0; y != n.y; ++y)
+      for (int x = 0; x != n.x; ++x) {
+        const std::size_t entry = (std::size_t(z) * n.y + y) * n.x + x;
+        int nearest = 32;
+        for (int k = 0; k != n.z; ++k)
+          for (int j = 0; j != n.y; ++j)
+            for (int i = 0; i != n.x; ++i)
+              if (!constants.contains(grid->table[(std::size_t(k) * n.y + j) * n.x + i]))
+                nearest = std::min(nearest, std::max({std::abs(i - x), std::abs(j - y), std::abs(k - z)}));
+        most = std::max(most, nearest);
+        ASSERT_EQ(int(volume.uniformity()[entry]), nearest) << x << " " << y << " " << z;
+      }
+  // A cube of bricks that fits into the ball.
+  EXPECT_GE(most, 3);
 }
 
 TEST(RenderVolume, OutlinesEveryVoxelAboveZero) {

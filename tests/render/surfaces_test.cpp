@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "modeling/error.h"
@@ -184,6 +185,59 @@ TEST(Surfaces, CastShadowsIntoTheVolume) {
 TEST(Surfaces, NeedAVolume) {
   const auto empty = std::make_shared<BrickGrid>(*ball(1.0f, 0.1f, 0.0f));
   EXPECT_THROW(renderImage(RenderVolume(empty), medium(1), kSun, needle(), with({{square(0)}})), Error);
+}
+
+TEST(Surfaces, CastTheShadowsOfPointsAndSpotsIntoTheVolume) {
+  // A plate half way between the light and the ball covers the upper half of its light.
+  const RenderVolume volume(ball(1.0f, 0.05f));
+  Mesh plate;
+  plate.positions = {{3, 0, -5}, {3, 5, -5}, {3, 5, 5}, {3, 0, 5}};
+  const std::uint32_t corners[] = {0, 1, 2, 3};
+  plate.addFace(corners);
+  LocalLight light;
+  light.position = {6, 0, 0};
+  light.intensity = {36, 36, 36};
+  for (const bool isSpot : {false, true}) {
+    if (isSpot) light.cone = LocalLight::Cone{{-1, 0, 0}, 30, 5};
+    const auto lightAt = [&](float y, bool isThere) {
+      RenderOptions options = with({{plate}});
+      if (!isThere) options.surfaces.reset();
+      return renderImage(volume, medium(1.0f), Lights{{}, {}, {light}}, needle({0, y, 9}, {0, y, 0}), options)
+          .image.at("R", 0, 0);
+    };
+    EXPECT_NEAR(lightAt(-0.15f, true), lightAt(-0.15f, false), 1e-6f);
+    EXPECT_LT(lightAt(0.15f, true), 1e-6f * lightAt(0.15f, false));
+    EXPECT_GT(lightAt(0.15f, false), 0.01f);
+  }
+}
+
+TEST(Surfaces, StopTheColoursThatShadowMultipliersLetThroughTheVolume) {
+  const RenderVolume volume(ball(1.0f, 0.05f));
+  Mesh plate;
+  plate.positions = {{3, -5, -5}, {3, 5, -5}, {3, 5, 5}, {3, -5, 5}};
+  const std::uint32_t corners[] = {0, 1, 2, 3};
+  plate.addFace(corners);
+  const Lights sun{{{.direction = {1, 0, 0}, .shadow = {1, 0.3f, 0.05f}}}, {}};
+  const Image image = renderImage(volume, medium(1.0f), sun, needle(), with({{plate}})).image;
+  EXPECT_LT(image.at("B", 0, 0), 1e-6f);
+}
+
+TEST(Surfaces, EstimateTheirMemory) {
+  // A sheet of 20000 triangles.
+  Mesh sheet;
+  constexpr std::uint32_t n = 100;
+  for (std::uint32_t y = 0; y <= n; ++y)
+    for (std::uint32_t x = 0; x <= n; ++x)
+      sheet.positions.push_back({double(x), double(y), std::sin(0.3 * x + 0.7 * y)});
+  for (std::uint32_t y = 0; y != n; ++y)
+    for (std::uint32_t x = 0; x != n; ++x) {
+      const std::uint32_t a = y * (n + 1) + x;
+      sheet.addFace(std::array{a, a + 1, a + n + 2, a + n + 1});
+    }
+  const std::size_t bytes = Surfaces({{sheet}}).memoryBytes();
+  // At least corners and positions, as Embree and we hold them.
+  EXPECT_GT(bytes, 20000u * 24 + 10201u * 36);
+  EXPECT_LE(double(bytes), Surfaces::estimateBytes(sheet));
 }
 
 }  // namespace

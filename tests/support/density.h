@@ -60,4 +60,13 @@ inline std::shared_ptr<BrickGrid> slab(float thickness, float halfWidth, float v
                      [=](const Vec3f& p) { return std::fabs(p.z) < thickness / 2 ? value : 0.0f; });
 }
 
+/// Distance along a ray to a ball, infinite where it misses or starts behind it.
+inline double distanceToBall(const Vec3d& origin, const Vec3d& direction, const Vec3d& centre,
+                             double radius) {
+  const Vec3d way = origin - centre;
+  const double b = dot(way, direction), inside = b * b + radius * radius - dot(way, way);
+  const double distance = inside < 0 ? -1 : -b - std::sqrt(inside);
+  return distance >= 0 ? distance : INFINITY;
+}
+
 }  // namespace nephele::test

@@ -1,0 +1,34 @@
+#include "apps/cloud_advection.h"
+
+#include "apps/velocity_options.h"
+#include "levelset/advection.h"
+#include "levelset/advection_files.h"
+
+namespace nephele::apps {
+
+VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, double longestSide, int seed,
+                                         Run& run) const {
+  if (strength.value == 0) return density;
+  run.begin("advect");
+  VelocityArguments velocity;
+  velocity.amplitude = {strength.value / steps, strength.relative};
+  velocity.frequency = frequency;
+  velocity.octaves = 4;
+  velocity.roughness = 0.6;
+  velocity.seed = seed;
+  const AdvectionOptions options{.method = AdvectionMethod::gridless, .steps = steps};
+  const CarriedGrids grids = carriedGrids({density});
+  if (grids.box.isEmpty()) return density;
+  run.requireMemory(estimatedAdvectionBytes(grids.bricks, options),
+                    "use larger voxels (a lower --resolution or a larger --voxel-size)");
+  return toVdb(grids, advectGrids(grids.bricks, velocity.field(longestSide), options, run).grids).front();
+}
+
+void addCloudAdvectionOptions(CLI::App& app, CloudAdvectionArguments& a) {
+  addLength(app, "--advect", a.strength,
+            "Way by which noise carries the finished density: ragged edges and wisps; see nephele advect.");
+  addFrequency(app, "--advect-frequency", a.frequency, "Frequency of that noise.");
+  addCount(app, "--advect-steps", a.steps, 1, 1000, "Steps in which it goes; fewer fold and tear more.");
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "apps/app.h"
+#include "levelset/vdb_io.h"
+
+namespace nephele::apps {
+
+/// The one-line form of advection that the verb cloud has: noise frays the finished cloud.
+struct CloudAdvectionArguments {
+  /// Rms way along each axis; 0: none.
+  Length strength{0, true};
+  Frequency frequency{10, true};
+  int steps = 4;
+
+  /// `density` carried along, or itself. Several octaves of noise, drawn from `seed`.
+  VdbGrid carried(const VdbGrid& density, double longestSide, int seed, Run& run) const;
+};
+
+/// Declares the options on `app`.
+void addCloudAdvectionOptions(CLI::App& app, CloudAdvectionArguments& arguments);
+
+}  // namespace nephele::apps
