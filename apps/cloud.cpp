@@ -52,7 +52,7 @@ void growCloud(const CloudArguments& arguments, Run& run) {
 
 Verb cloudVerb() {
   const auto arguments = std::make_shared<CloudArguments>();
-  return {"cloud", "Grows a cumulus cloud on a mesh or a level set.",
+  return {"cloud", "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
           "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x",
           [arguments](CLI::App& app) { addCloudOptions(app, *arguments); },
           [arguments](Run& run) { growCloud(*arguments, run); }};

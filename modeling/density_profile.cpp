@@ -99,9 +99,9 @@ ScalarField ramp(const ScalarField& f, std::vector<RampStop> stops) {
   for (std::size_t i = 0; i < stops.size(); ++i) {
     require(std::isfinite(stops[i].at) && std::isfinite(stops[i].value),
             "ramp: stop " + std::to_string(i + 1) + " is not finite");
-    require(i == 0 || stops[i].at >= stops[i - 1].at, "ramp: places must rise, got " +
-                                                          std::to_string(stops[i].at) + " after " +
-                                                          std::to_string(stops[i - 1].at));
+    if (i == 0) continue;
+    require(stops[i].at >= stops[i - 1].at, "ramp: places must rise, got " + std::to_string(stops[i].at) +
+                                                " after " + std::to_string(stops[i - 1].at));
   }
   return ScalarField(std::make_shared<RampNode>(f.node(), std::move(stops)));
 }

@@ -246,8 +246,8 @@ TEST_F(RenderLayers, DeepPicturesFlattenToThePictureInAnotherProgram) {
 
 TEST_F(RenderLayers, NeitherPictureIsThereWhereTheDeepOneCannotBeWritten) {
   const TemporaryFolder folder;
-  const std::string arguments = start() + folder.file("a.exr") + " --aov none --extinction 4" +
-                                " --deep " + folder.file("d.exr");
+  const std::string arguments =
+      start() + folder.file("a.exr") + " --aov none --extinction 4" + " --deep " + folder.file("d.exr");
   ASSERT_EQ(runProgram(arguments).exitCode, 0);
   const auto flat = std::filesystem::file_size(folder.file("a.exr")),
              deep = std::filesystem::file_size(folder.file("d.exr"));

@@ -36,7 +36,7 @@ def panel(series, column, title, left):
     for i in range(5):
         value = top_value * i / 4
         out.append(f'<path d="M{left} {y(value):.1f}h{WIDTH}" stroke="#ddd"/>'
-                   f'<text x="{left - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{value:.3g}</text>')
+                   f'<text x="{left - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{value:.0f}</text>')
     for steps in range(0, last + 1, 10):
         out.append(f'<text x="{x(steps):.1f}" y="{TOP + HEIGHT + 18}" text-anchor="middle">{steps}</text>')
     out.append(f'<text x="{left + WIDTH / 2}" y="{TOP + HEIGHT + 38}" text-anchor="middle">steps before the frame</text>')
