@@ -74,7 +74,6 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
                     "make the picture smaller (--size), or the volume with larger voxels");
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
   if (options.skipExisting) skipExisting(plan, start, run);
-
   makeFrames(plan, options, picture, volume, start, run);
   makeMovieAndSheet(plan, options, picture, run);
 
