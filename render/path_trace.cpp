@@ -164,11 +164,13 @@ class PathTracer {
     Vec3f towards, lattice, irradiance, shadow;
   };
 
-  // Distance to the next collision from the origin of `ray`; infinite if it leaves the volume.
-  float freePath(const LatticeRay& ray, Random& random) const {
-    float depth = random.depth(), hit = kInfinite;
-    detail::walkBricks(scene_, ray, kInfinite, [&](float s, float end, std::int32_t pool) {
-      const float most = scene_.ranges[pool].max, bound = medium_.extinction * most;
+  // Tentative collisions along `length` of a ray, by delta tracking: calls meet(s, bound, pool) at each
+  // until it returns false; boundOf(pool) is an extinction that none in the brick exceeds.
+  template <class BoundOf, class Meet>
+  void collide(const LatticeRay& ray, float length, Random& random, BoundOf&& boundOf, Meet&& meet) const {
+    float depth = random.depth();
+    detail::walkBricks(scene_, ray, length, [&](float s, float end, std::int32_t pool) {
+      const float bound = boundOf(pool);
       for (;;) {
         const float step = std::fmax(depth / bound, leastStep_);
         if (!(s + step < end)) {
@@ -176,13 +178,24 @@ class PathTracer {
           return true;
         }
         s += step;
-        if (random.next() * most < density(ray.origin + ray.direction * s)) {
-          hit = s;
-          return false;
-        }
+        if (!meet(s, bound, pool)) return false;
         depth = random.depth();
       }
     });
+  }
+
+  // Distance to the next collision from the origin of `ray`; infinite if it leaves the volume.
+  float freePath(const LatticeRay& ray, Random& random) const {
+    float hit = kInfinite;
+    collide(
+        ray, kInfinite, random,
+        [&](std::int32_t pool) { return medium_.extinction * scene_.ranges[pool].max; },
+        [&](float s, float, std::int32_t pool) {
+          if (!(random.next() * scene_.ranges[pool].max < density(ray.origin + ray.direction * s)))
+            return true;
+          hit = s;
+          return false;
+        });
     return hit;
   }
 
@@ -191,35 +204,31 @@ class PathTracer {
   // tracking, Kutz, Habel, Li and Novak 2017); at each one the path sees what glows there per extinction.
   float freePath(const LatticeRay& ray, Vec3f& weight, Vec3d& glow, Random& random) const {
     if (!isColoured_) return freePath(ray, random);
-    float depth = random.depth(), hit = kInfinite;
-    detail::walkBricks(scene_, ray, kInfinite, [&](float s, float end, std::int32_t pool) {
-      const float bound = std::fmax(medium_.extinction * scene_.ranges[pool].max, leastBound_);
-      for (;;) {
-        const float step = std::fmax(depth / bound, leastStep_);
-        if (!(s + step < end)) {
-          depth = std::fmax(0.0f, depth - (end - s) * bound);
+    float hit = kInfinite;
+    collide(
+        ray, kInfinite, random,
+        [&](std::int32_t pool) {
+          return std::fmax(medium_.extinction * scene_.ranges[pool].max, leastBound_);
+        },
+        [&](float s, float bound, std::int32_t) {
+          const Vec3f p = ray.origin + ray.direction * s;
+          if (scene_.emission.table)
+            for (int c = 0; c != 3; ++c)
+              glow[c] += double(weight[c] * perEmission_ / bound) *
+                         double(valueAt(
+                             {scene_.emission.values[c], scene_.emission.table, scene_.emission.count}, p));
+          const Vec3f real = colour_ * std::fmin(medium_.extinction * density(p) / bound, 1.0f);
+          const float sum = weight.x + weight.y + weight.z;
+          if (!(sum > 0)) return false;
+          const float chance = dot(weight, real) / sum;
+          if (random.next() < chance) {
+            weight = weight * real / chance;
+            hit = s;
+            return false;
+          }
+          weight = weight * (Vec3f{1, 1, 1} - real) / (1 - chance);
           return true;
-        }
-        s += step;
-        const Vec3f p = ray.origin + ray.direction * s;
-        if (scene_.emission.table)
-          for (int c = 0; c != 3; ++c)
-            glow[c] +=
-                double(weight[c] * perEmission_ / bound) *
-                double(valueAt({scene_.emission.values[c], scene_.emission.table, scene_.emission.count}, p));
-        const Vec3f real = colour_ * std::fmin(medium_.extinction * density(p) / bound, 1.0f);
-        const float sum = weight.x + weight.y + weight.z;
-        if (!(sum > 0)) return false;
-        const float chance = dot(weight, real) / sum;
-        if (random.next() < chance) {
-          weight = weight * real / chance;
-          hit = s;
-          return false;
-        }
-        weight = weight * (Vec3f{1, 1, 1} - real) / (1 - chance);
-        depth = random.depth();
-      }
-    });
+        });
     return hit;
   }
 
@@ -233,27 +242,21 @@ class PathTracer {
 
   // An unbiased estimate of exp(-shadow * optical depth) along `length` from the origin of `ray` on.
   float transmittance(const LatticeRay& ray, float length, float shadow, Random& random) const {
-    float depth = random.depth(), through = 1.0f;
-    detail::walkBricks(scene_, ray, length, [&](float s, float end, std::int32_t pool) {
-      const float most = scene_.ranges[pool].max, bound = medium_.extinction * shadow * most;
-      for (;;) {
-        const float step = std::fmax(depth / bound, leastStep_);
-        if (!(s + step < end)) {
-          depth = std::fmax(0.0f, depth - (end - s) * bound);
-          return true;
-        }
-        s += step;
-        through *= std::fmax(0.0f, 1.0f - density(ray.origin + ray.direction * s) / most);
-        if (through < kLeastTransmittance) {
+    float through = 1.0f;
+    collide(
+        ray, length, random,
+        [&](std::int32_t pool) { return medium_.extinction * shadow * scene_.ranges[pool].max; },
+        [&](float s, float, std::int32_t pool) {
+          const float there = density(ray.origin + ray.direction * s);
+          through *= std::fmax(0.0f, 1.0f - there / scene_.ranges[pool].max);
+          if (through >= kLeastTransmittance) return true;
           if (random.next() * kLeastTransmittance >= through) {
             through = 0.0f;
             return false;
           }
           through = kLeastTransmittance;
-        }
-        depth = random.depth();
-      }
-    });
+          return true;
+        });
     return through;
   }
 

@@ -9,6 +9,7 @@
 #include "render/march_kernels.h"
 #include "render/raymarch.h"
 #include "tests/support/density.h"
+#include "tests/support/march_scene.h"
 
 namespace nephele {
 namespace {
@@ -35,15 +36,11 @@ struct Rays {
   std::shared_ptr<const BrickGrid> grid;
   RenderVolume volume{grid};
   LightVolume light{volume, {0.3f, 0.8f, 0.4f}};
-  MarchScene scene;
+  MarchScene scene = test::sceneOf(volume, light);
   std::vector<MarchRay> rays;
   std::vector<MarchResult> results;
 
   Rays(std::shared_ptr<const BrickGrid> density, int octaves, float extinction) : grid(std::move(density)) {
-    scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
-    scene.ranges = grid->ranges.data();
-    scene.emptiness = volume.emptiness().data();
-    scene.suns.push_back({light.values().data(), light.table().data(), light.brickCount()});
     scene.octaves = octaves;
     scene.attenuation[1] = 0.9f, scene.attenuation[2] = 0.7f;
     scene.extinction = extinction;

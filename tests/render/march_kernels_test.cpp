@@ -9,6 +9,7 @@
 #include "render/render_volume.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
+#include "tests/support/march_scene.h"
 
 namespace nephele {
 namespace {
@@ -27,11 +28,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   for (std::size_t i = 0; i != sky.size(); ++i) sky[i] = 0.5f + 0.4f * std::sin(float(i));
   const Affine toSky{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
 
-  MarchScene scene;
-  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
-  scene.ranges = grid->ranges.data();
-  scene.emptiness = volume.emptiness().data();
-  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}});
+  MarchScene scene = test::sceneOf(volume, light);
   // Three colours of the sun, of which green has none, and of the sky.
   scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
   scene.scatteredSize = {5, 4, 2};
@@ -64,7 +61,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
       std::vector<MarchResult> results(rays.size());
       marchRays(scene, rays, results);
       for (std::size_t i = 0; i != rays.size(); ++i) {
-        // The vectors notice only every 16 samples that nothing is left to see.
+        // The vectors notice only every 32 samples that nothing is left to see.
         const float seen = std::exp(-expected[i].opticalDepth);
         ASSERT_NEAR(std::exp(-results[i].opticalDepth), seen, 1.1e-4f);
         for (int c = 0; c != 3; ++c) ASSERT_NEAR(results[i].sky[c], expected[i].sky[c], 2e-4f);
@@ -83,11 +80,7 @@ TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
   const auto grid = test::ball(1.0f, 0.1f);
   const RenderVolume volume(grid);
   const LightVolume light(volume, {0, 0, 1});
-  MarchScene scene;
-  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
-  scene.ranges = grid->ranges.data();
-  scene.emptiness = volume.emptiness().data();
-  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}});
+  MarchScene scene = test::sceneOf(volume, light);
   scene.extinction = 1.5f;
   scene.step = 0.05f;
   const HoldoutCurve::Knot knots[] = {{8.5f, 0}, {9.0f, 0.4f}, {9.0f, 0.9f}, {9.3f, 1.0f}};

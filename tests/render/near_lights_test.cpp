@@ -10,6 +10,7 @@
 #include "render/raymarch.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
+#include "tests/support/march_scene.h"
 
 namespace nephele {
 namespace {
@@ -249,10 +250,7 @@ TEST(NearLights, VectorsAgreeWithTheScalarLoop) {
   std::vector<ProjectedLightVolume> shadows;
   for (const LocalLight& light : lights) shadows.emplace_back(volume, light);
 
-  MarchScene scene;
-  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
-  scene.ranges = grid->ranges.data();
-  scene.emptiness = volume.emptiness().data();
+  MarchScene scene = test::sceneOf(volume);
   scene.octaves = 2;
   scene.attenuation[1] = 0.4f;
   scene.colours = 3;

@@ -9,6 +9,7 @@
 #include "render/raymarch.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
+#include "tests/support/march_scene.h"
 
 namespace nephele {
 namespace {
@@ -252,11 +253,7 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
                                 [](const Vec3f& p) { return std::fmax(0.0f, std::sin(2 * p.x + p.y)); });
   const RenderVolume volume(grid, {coloured(*grid, {0.9f, 0.5f, 0.2f}), coloured(*glow, {2, 1, 0.5f})});
   const LightVolume light(volume, {0.3f, 0.8f, 0.4f});
-  MarchScene scene;
-  scene.density = {grid->values.data(), grid->table.data(), grid->brickCount};
-  scene.ranges = grid->ranges.data();
-  scene.emptiness = volume.emptiness().data();
-  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}, {1, 1, 1}});
+  MarchScene scene = test::sceneOf(volume, light);
   const auto set = [](const VolumeColour::Grids& grids, MarchScene::ColourBricks& bricks) {
     for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values.data();
     bricks.table = grids[0]->table.data();
