@@ -20,13 +20,18 @@ inline constexpr float kVisibleOpacity = 0.005f;
 template <class Visit>
 inline void walkBricks(const MarchScene& scene, const LatticeRay& ray, float length, Visit&& visit) {
   constexpr float size = 8.0f;
+  constexpr float infinite = std::numeric_limits<float>::infinity();
   const Vec3i count = scene.density.count;
-  Vec3i brick, side;
-  Vec3f inverse;
+  Vec3i brick, forward;
+  Vec3f inverse, exits;
+  const auto exitOf = [&](int axis, int plane) {
+    return ray.direction[axis] == 0 ? infinite : (float(plane) * size - ray.origin[axis]) * inverse[axis];
+  };
   for (int axis = 0; axis != 3; ++axis) {
     brick[axis] = std::clamp(int(std::floor(ray.origin[axis] / size)), 0, count[axis] - 1);
-    side[axis] = ray.direction[axis] > 0 ? 1 : 0;
+    forward[axis] = ray.direction[axis] > 0 ? 1 : 0;
     inverse[axis] = 1.0f / ray.direction[axis];
+    exits[axis] = exitOf(axis, brick[axis] + forward[axis]);
   }
   float s = 0.0f;
   for (;;) {
@@ -35,31 +40,44 @@ inline void walkBricks(const MarchScene& scene, const LatticeRay& ray, float len
         std::size_t(brick.x);
     const int away = scene.emptiness[entry],
               alike = away == 0 && scene.uniformity ? scene.uniformity[entry] : away;
-    const int radius = alike > 1 ? alike - 1 : 0;
-
+    if (alike <= 1) {
+      // Rounding must not turn the ray back.
+      const float nearest = std::min({exits.x, exits.y, exits.z}), out = std::max(nearest, s);
+      if (away == 0 && !visit(s, std::min(out, length), scene.density.table[entry])) return;
+      if (!(out < length)) return;
+      s = out;
+      // Without branches, which could not be foreseen; through an edge on both axes at once.
+      bool isInside = true;
+      for (int axis = 0; axis != 3; ++axis) {
+        const bool crossed = exits[axis] == nearest;
+        brick[axis] += crossed ? 2 * forward[axis] - 1 : 0;
+        exits[axis] = exitOf(axis, brick[axis] + forward[axis]);
+        isInside &= unsigned(brick[axis]) < unsigned(count[axis]);
+      }
+      if (!isInside) return;
+      continue;
+    }
+    const int radius = alike - 1;
     int exit = 0;
-    float out = std::numeric_limits<float>::infinity();
+    float out = infinite;
     for (int axis = 0; axis != 3; ++axis) {
-      if (ray.direction[axis] == 0) continue;
-      const int plane = side[axis] ? brick[axis] + radius + 1 : brick[axis] - radius;
-      const float at = (float(plane) * size - ray.origin[axis]) * inverse[axis];
+      const float at = exitOf(axis, forward[axis] ? brick[axis] + radius + 1 : brick[axis] - radius);
       if (at < out) out = at, exit = axis;
     }
-    // Rounding must not turn the ray back.
     out = std::max(out, s);
     if (away == 0 && !visit(s, std::min(out, length), scene.density.table[entry])) return;
     if (!(out < length)) return;
 
     s = out;
     const int low = brick[exit] - radius, high = brick[exit] + radius;
-    if (radius > 0)
-      for (int axis = 0; axis != 3; ++axis) {
-        const int at = int(std::floor((ray.origin[axis] + s * ray.direction[axis]) / size));
-        brick[axis] =
-            std::clamp(std::clamp(at, brick[axis] - radius, brick[axis] + radius), 0, count[axis] - 1);
-      }
-    brick[exit] = side[exit] ? high + 1 : low - 1;
+    for (int axis = 0; axis != 3; ++axis) {
+      const int at = int(std::floor((ray.origin[axis] + s * ray.direction[axis]) / size));
+      brick[axis] =
+          std::clamp(std::clamp(at, brick[axis] - radius, brick[axis] + radius), 0, count[axis] - 1);
+    }
+    brick[exit] = forward[exit] ? high + 1 : low - 1;
     if (brick[exit] < 0 || brick[exit] >= count[exit]) return;
+    for (int axis = 0; axis != 3; ++axis) exits[axis] = exitOf(axis, brick[axis] + forward[axis]);
   }
 }
 
@@ -78,7 +96,14 @@ inline float stepGrowth(const MarchScene& scene, float depth) {
 /// behind a gap. Steps grow with the optical depth that the ranges of the bricks in front promise.
 template <class Take>
 inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take) {
+  // Enough steps to be worth a call.
+  constexpr int kMany = 64;
+  struct Run {
+    float start = 0.0f, ds = 0.0f, density = -1.0f, end = 0.0f;
+    int count = 0;
+  } run;
   float cursor = 0.0f, depth = 0.0f, growth = 1.0f;
+  bool goesOn = true;
   walkBricks(scene, ray.density, ray.length, [&](float s0, float s1, std::int32_t pool) {
     cursor = std::max(cursor, s0);
     if (!(cursor < s1)) return true;
@@ -88,25 +113,35 @@ inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take
     const float wide = std::max(usual, std::min(4.0f * scene.step, scene.pixelAngle * (ray.start + s0)));
     const float thickest = scene.extinction * range.max,
                 thinnest = scene.extinction * std::max(range.min, 0.0f);
-    const float least = std::max(std::min(wide, scene.stepDepth / thickest), scene.leastStep);
+    const float least =
+        std::max(thickest * wide > scene.stepDepth ? scene.stepDepth / thickest : wide, scene.leastStep);
     while (cursor < s1) {
       // Where the density varies it must still be met at every voxel.
       float ds = uniform ? least * growth : std::min(least * growth, std::max(least, scene.step));
       // As far as the growth is about the same.
-      const float end = std::min(s1, cursor + std::max(1.0f / thinnest, ds));
+      const float end =
+          thinnest * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest, ds)) : s1;
       const int count = int(std::ceil((end - cursor) / ds));
       // The last of steps longer than a voxel must not reach into a brick that differs.
       if (end == s1 && (uniform || (ray.isCut && s1 >= ray.length))) ds = (s1 - cursor) / float(count);
-      const float start = cursor;
+      const float start = cursor, density = range.isPoint() ? range.max : -1.0f;
       cursor += float(count) * ds;
       if (thinnest > 0) {
         depth += thinnest * (std::min(cursor, s1) - start);
         growth = stepGrowth(scene, depth);
       }
-      if (!take(start, ds, count, range.isPoint() ? range.max : -1.0f)) return false;
+      if (run.count > 0 && run.count < kMany && start == run.end && ds == run.ds && density == run.density) {
+        run.count += count;
+      } else {
+        if (run.count > 0 && !take(run.start, run.ds, run.count, run.density)) return goesOn = false;
+        run = {start, ds, density, cursor, count};
+        continue;
+      }
+      run.end = cursor;
     }
     return true;
   });
+  if (goesOn && run.count > 0) take(run.start, run.ds, run.count, run.density);
 }
 
 }  // namespace nephele::detail

@@ -43,68 +43,172 @@ HWY_INLINE Point pointAt(const LatticeRay& ray, Floats s) {
           hn::MulAdd(s, hn::Set(d, ray.direction.z), hn::Set(d, ray.origin.z))};
 }
 
-// values[at] and values[at + 1]. Gathers cost as many loads as they have lanes, so that fetching neighbours
-// together halves them.
-HWY_INLINE void gatherPair(const float* HWY_RESTRICT values, Ints at, Floats& first, Floats& second) {
-  const Lanes d;
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
-  const hn::Repartition<std::int64_t, Lanes> wide;
-  const hn::Half<IntLanes> half;
-  const auto* pairs = reinterpret_cast<const std::int64_t*>(values);
-  const auto fetch = [&](auto index) HWY_ATTR {
-    return hn::BitCast(d, hn::GatherOffset(wide, pairs, hn::ShiftLeft<2>(hn::PromoteTo(wide, index))));
-  };
-  const Floats low = fetch(hn::LowerHalf(half, at)), high = fetch(hn::UpperHalf(half, at));
-  first = hn::ConcatEven(d, high, low);
-  second = hn::ConcatOdd(d, high, low);
+constexpr int kLanes = int(hn::MaxLanes(Lanes()));
+
+// Keeps the compiler from taking a stored vector apart in registers, which costs more than loading its parts.
+HWY_INLINE const volatile std::int32_t* inMemory(const std::int32_t* stored) {
+  return stored;
+}
+
+// The numbers at[n][offset] and at[n][offset + 1] of as many places as half a vector has lanes.
+template <class D>
+HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offset) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Set(d, at[0][offset]);
 #else
-  first = hn::GatherIndex(d, values, at);
-  second = hn::GatherIndex(d, values + 1, at);
+  if constexpr (hn::MaxLanes(D()) == 2) {
+    return hn::LoadU(d, at[0] + offset);
+#if HWY_ARCH_X86
+  } else if constexpr (hn::MaxLanes(D()) == 4) {
+    const auto* first = reinterpret_cast<const double*>(at[0] + offset);
+    const auto* second = reinterpret_cast<const double*>(at[1] + offset);
+    return hn::Vec<D>{_mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(first), second))};
+#endif
+  } else {
+    const hn::Half<D> half;
+    constexpr int quarter = int(hn::MaxLanes(D())) / 4;
+    return hn::Combine(d, pairsAt(half, at + quarter, offset), pairsAt(half, at, offset));
+  }
 #endif
 }
 
-// Values between the nodes around (x, y, z), all >= 0, of a block of nodes that starts at `base`.
-HWY_INLINE Floats trilinear(const float* HWY_RESTRICT values, Ints base, Point p, int strideY, int strideZ) {
+// Numbers at the eight corners of cells, as pairs along x of the first half of the lanes and of the second.
+struct Corners {
+  Floats pairs[4][2];
+};
+
+HWY_INLINE Floats alongX(Floats low, Floats high, Floats share) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::MulAdd(share, hn::Sub(high, low), low);
+#else
   const Lanes d;
-  const IntLanes i;
-  const Ints ix = hn::ConvertTo(i, p.x), iy = hn::ConvertTo(i, p.y), iz = hn::ConvertTo(i, p.z);
-  const Floats fx = hn::Sub(p.x, hn::ConvertTo(d, ix)), fy = hn::Sub(p.y, hn::ConvertTo(d, iy)),
-               fz = hn::Sub(p.z, hn::ConvertTo(d, iz));
-  const Ints at =
-      hn::Add(hn::Add(base, ix), hn::Add(hn::Mul(iy, hn::Set(i, strideY)), hn::Mul(iz, hn::Set(i, strideZ))));
-  const auto edge = [&](int offset) HWY_ATTR {
-    Floats a, b;
-    gatherPair(values + offset, at, a, b);
-    return hn::MulAdd(fx, hn::Sub(b, a), a);
-  };
-  const Floats near0 = edge(0), near1 = edge(strideY), far0 = edge(strideZ), far1 = edge(strideZ + strideY);
-  const Floats nearFace = hn::MulAdd(fy, hn::Sub(near1, near0), near0);
-  const Floats farFace = hn::MulAdd(fy, hn::Sub(far1, far0), far0);
-  return hn::MulAdd(fz, hn::Sub(farFace, nearFace), nearFace);
+  const Floats first = hn::ConcatEven(d, high, low), second = hn::ConcatOdd(d, high, low);
+  return hn::MulAdd(share, hn::Sub(second, first), first);
+#endif
 }
 
-template <int kWidth, int kBefore>
-HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
+HWY_INLINE Floats between(const Corners& corners, Point f) {
+  const auto edge = [&](int n) HWY_ATTR { return alongX(corners.pairs[n][0], corners.pairs[n][1], f.x); };
+  const Floats near0 = edge(0), near1 = edge(1), far0 = edge(2), far1 = edge(3);
+  const Floats nearFace = hn::MulAdd(f.y, hn::Sub(near1, near0), near0);
+  const Floats farFace = hn::MulAdd(f.y, hn::Sub(far1, far0), far0);
+  return hn::MulAdd(f.z, hn::Sub(farFace, nearFace), nearFace);
+}
+
+// The corners of cells whose first nodes are at addressOf(lane). Made of plain loads, as many at a time as
+// addresses fit into registers: gather instructions take several times as long on many processors.
+template <class AddressOf>
+HWY_INLINE Corners cornersAt(int strideY, int strideZ, AddressOf&& addressOf) {
+  const Lanes d;
+  Corners corners;
+#if HWY_TARGET == HWY_SCALAR
+  const float* at = addressOf(0);
+  const int offsets[4] = {0, strideY, strideZ, strideZ + strideY};
+  for (int n = 0; n != 4; ++n)
+    for (int part = 0; part != 2; ++part) corners.pairs[n][part] = hn::Set(d, at[offsets[n] + part]);
+#else
+  for (int part = 0; part != 2; ++part) {
+    const float* at[kLanes / 2];
+    for (int n = 0; n != kLanes / 2; ++n) at[n] = addressOf(part * (kLanes / 2) + n);
+    corners.pairs[0][part] = pairsAt(d, at, 0);
+    corners.pairs[1][part] = pairsAt(d, at, strideY);
+    corners.pairs[2][part] = pairsAt(d, at, strideZ);
+    corners.pairs[3][part] = pairsAt(d, at, strideZ + strideY);
+  }
+#endif
+  return corners;
+}
+
+// An integer >= 0 and < 2^23 that is held as a float.
+HWY_INLINE Ints wholeOf(Floats x) {
+  const Lanes d;
+  const IntLanes i;
+  return hn::And(hn::BitCast(i, hn::Add(x, hn::Set(d, 8388608.0f))), hn::Set(i, 0x7fffff));
+}
+
+// Cells of a dense lattice of nodes: their first nodes, and how far beyond these points lie.
+struct Cells {
+  alignas(64) std::int32_t node[kLanes];
+  Point share;
+  int strideY, strideZ;
+};
+
+// Those around p, all >= 0 and within the lattice.
+HWY_INLINE void locate(const Vec3i& size, Point p, Cells& cells) {
+  const IntLanes i;
+  const Floats x = hn::Floor(p.x), y = hn::Floor(p.y), z = hn::Floor(p.z);
+  cells.strideY = size.x;
+  cells.strideZ = size.x * size.y;
+  hn::Store(hn::Add(wholeOf(x), hn::Add(hn::Mul(wholeOf(y), hn::Set(i, cells.strideY)),
+                                        hn::Mul(wholeOf(z), hn::Set(i, cells.strideZ)))),
+            i, cells.node);
+  cells.share = {hn::Sub(p.x, x), hn::Sub(p.y, y), hn::Sub(p.z, z)};
+}
+
+HWY_INLINE Floats read(const float* HWY_RESTRICT values, const Cells& cells) {
+  const Corners corners = cornersAt(cells.strideY, cells.strideZ,
+                                    [&](int n) HWY_ATTR { return values + inMemory(cells.node)[n]; });
+  return between(corners, cells.share);
+}
+
+// Where points lie in bricks: entry of the table, first node of the cell in the brick, and how far beyond it.
+struct Places {
+  alignas(64) std::int32_t entry[kLanes], node[kLanes];
+  Point share;
+};
+
+template <int kWidth>
+HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places) {
   const Lanes d;
   const IntLanes i;
   const Floats zero = hn::Zero(d), size = hn::Set(d, 8.0f), eighth = hn::Set(d, 0.125f);
   // Just under 8, so that a point on the far face still lies in the last cell.
   const Floats last = hn::Set(d, 7.9999995f);
-  const auto split = [&](Floats x, int count, Floats& local) HWY_ATTR {
-    const Floats brick = hn::Min(hn::Max(hn::Floor(hn::Mul(x, eighth)), zero), hn::Set(d, float(count - 1)));
-    local = hn::Min(hn::Max(hn::NegMulAdd(brick, size, x), zero), last);
-    return hn::ConvertTo(i, brick);
+  const auto brickOf = [&](Floats x, int count) HWY_ATTR {
+    return hn::Min(hn::Max(hn::Floor(hn::Mul(x, eighth)), zero), hn::Set(d, float(count - 1)));
   };
-  Point local;
-  const Ints bx = split(p.x, bricks.count.x, local.x), by = split(p.y, bricks.count.y, local.y),
-             bz = split(p.z, bricks.count.z, local.z);
-  const Ints entry =
-      hn::Add(hn::Mul(hn::Add(hn::Mul(bz, hn::Set(i, bricks.count.y)), by), hn::Set(i, bricks.count.x)), bx);
-  const Ints pool = hn::GatherIndex(i, bricks.table, entry);
-  constexpr int plane = kWidth * kWidth;
-  const Ints base =
-      hn::Add(hn::Mul(pool, hn::Set(i, plane * kWidth)), hn::Set(i, kBefore * (plane + kWidth + 1)));
-  return trilinear(bricks.values, base, local, kWidth, plane);
+  const auto within = [&](Floats x, Floats brick)
+                          HWY_ATTR { return hn::Min(hn::Max(hn::NegMulAdd(brick, size, x), zero), last); };
+  const Point brick{brickOf(p.x, bricks.count.x), brickOf(p.y, bricks.count.y), brickOf(p.z, bricks.count.z)};
+  const Point local{within(p.x, brick.x), within(p.y, brick.y), within(p.z, brick.z)};
+  const Point cell{hn::Floor(local.x), hn::Floor(local.y), hn::Floor(local.z)};
+  const Ints row = hn::Add(hn::Mul(wholeOf(brick.z), hn::Set(i, bricks.count.y)), wholeOf(brick.y));
+  hn::Store(hn::Add(hn::Mul(row, hn::Set(i, bricks.count.x)), wholeOf(brick.x)), i, places.entry);
+  hn::Store(wholeOf(hn::MulAdd(cell.z, hn::Set(d, float(kWidth * kWidth)),
+                               hn::MulAdd(cell.y, hn::Set(d, float(kWidth)), cell.x))),
+            i, places.node);
+  places.share = {hn::Sub(local.x, cell.x), hn::Sub(local.y, cell.y), hn::Sub(local.z, cell.z)};
+}
+
+template <int kWidth, int kBefore>
+HWY_INLINE Floats read(const MarchScene::Bricks& bricks, const Places& places) {
+  constexpr int kPlane = kWidth * kWidth;
+  const float* first = bricks.values + kBefore * (kPlane + kWidth + 1);
+  const Corners corners = cornersAt(kWidth, kPlane, [&](int n) HWY_ATTR {
+    return first + std::ptrdiff_t(bricks.table[inMemory(places.entry)[n]]) * (kPlane * kWidth) +
+           inMemory(places.node)[n];
+  });
+  return between(corners, places.share);
+}
+
+template <int kWidth, int kBefore>
+HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
+  Places places;
+  locate<kWidth>(bricks, p, places);
+  return read<kWidth, kBefore>(bricks, places);
+}
+
+// As many samples as a block has, at distances s along a ray. All places are found before the first value is
+// read, so that the processor need not wait for one vector before it starts the next.
+template <int kSize, int kWidth, int kBefore>
+HWY_INLINE void sampleBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
+                            const float* HWY_RESTRICT s, float* HWY_RESTRICT values) {
+  const Lanes d;
+  Places places[kSize / kLanes];
+  for (int v = 0; v != kSize / kLanes; ++v)
+    locate<kWidth>(bricks, pointAt(ray, hn::Load(d, s + v * kLanes)), places[v]);
+  for (int v = 0; v != kSize / kLanes; ++v)
+    hn::Store(hn::Max(read<kWidth, kBefore>(bricks, places[v]), hn::Zero(d)), d, values + v * kLanes);
 }
 
 // Three values at once, at p within bricks that are laid out as the density's.
@@ -127,7 +231,12 @@ HWY_INLINE Point clamped(Point p, const Vec3i& size) {
 class Marcher {
  public:
   Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result, MarchRecord* record)
-      : scene_(scene), ray_(ray), result_(result), record_(record), isHeld_(!ray.holdout.empty()) {}
+      : scene_(scene),
+        ray_(ray),
+        result_(result),
+        record_(record),
+        isHeld_(!ray.holdout.empty()),
+        needsBegin_(isHeld_ || record) {}
 
   // `count` steps of length `ds` from `start` on, of this density if it is not negative. False once the ray
   // is as good as opaque.
@@ -137,13 +246,18 @@ class Marcher {
     float begin = start;
     start += ray_.jitter * ds;
     while (count > 0) {
+      if (density >= 0 && !someKnown_) {
+        std::fill_n(known_, count_, -1.0f);
+        someKnown_ = true;
+      }
       // Whole vectors, whatever room there is: the blocks have as much again behind them.
-      for (int i = 0; i < kBlock; i += lanes) {
+      for (int i = 0; i < std::min(count, kBlock); i += lanes) {
         const Floats index = hn::Iota(d, float(i));
         hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), d, s_ + count_ + i);
-        hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), d, begin_ + count_ + i);
         hn::StoreU(hn::Set(d, ds), d, ds_ + count_ + i);
-        hn::StoreU(hn::Set(d, density), d, known_ + count_ + i);
+        if (needsBegin_)
+          hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), d, begin_ + count_ + i);
+        if (someKnown_) hn::StoreU(hn::Set(d, density), d, known_ + count_ + i);
       }
       const int taken = std::min(count, kBlock - count_);
       count_ += taken;
@@ -162,6 +276,7 @@ class Marcher {
     begin_[count_] = step.begin;
     ds_[count_] = step.length;
     known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
+    someKnown_ = true;
     return ++count_ != kBlock || (flush() && !isHidden_);
   }
 
@@ -172,6 +287,11 @@ class Marcher {
   }
 
  private:
+  template <int kColours>
+  struct Weights {
+    alignas(64) float of[kColours][kBlock];
+  };
+
   // Adds the steps collected. False once the ray is as good as opaque.
   bool flush() { return count_ > kBlock / 2 ? flushFirst<kBlock>() : flushFirst<kBlock / 2>(); }
 
@@ -183,21 +303,29 @@ class Marcher {
     const int used = count_;
     for (int i = used; i != kSize; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f, known_[i] = known_[used - 1];
     count_ = 0;
+    const bool someKnown = someKnown_;
+    someKnown_ = false;
     result_.samples += std::uint32_t(used);
 
     alignas(64) float depth[kBlock];
-    const Floats extinction = hn::Set(d, scene_.extinction);
-    for (std::size_t i = 0; i < kSize; i += lanes) {
-      Floats density = hn::Load(d, known_ + i);
-      if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d))))
-        density = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
-                              scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i))),
-                          hn::Zero(d));
-      hn::Store(hn::Mul(hn::Mul(density, extinction), hn::Load(d, ds_ + i)), d, depth + i);
+    if (!someKnown) {
+      sampleBlock<kSize, BrickGrid::kWidth, BrickGrid::kBefore>(scene_.density, ray_.density, s_, depth);
+    } else {
+      for (std::size_t i = 0; i < kSize; i += lanes) {
+        Floats density = hn::Load(d, known_ + i);
+        if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d))))
+          density = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
+                                scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i))),
+                            hn::Zero(d));
+        hn::Store(density, d, depth + i);
+      }
     }
+    const Floats extinction = hn::Set(d, scene_.extinction);
+    for (std::size_t i = 0; i < kSize; i += lanes)
+      hn::Store(hn::Mul(hn::Mul(hn::Load(d, depth + i), extinction), hn::Load(d, ds_ + i)), d, depth + i);
     alignas(64) float after[kBlock];
     const float start = depth_;
-    for (int i = 0; i != kSize; ++i) after[i] = depth_ += depth[i];
+    addUp<kSize>(depth, after);
     if (depth_ == start && !scene_.emission.table) return true;
     if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
@@ -216,13 +344,31 @@ class Marcher {
       hn::StoreU(hn::Exp(d, hn::Neg(tau)), d, through + 1 + i);
     }
     through_ = through[kSize];
+    Weights<1> weights;
     for (std::size_t i = 0; i < kSize; i += lanes) {
       Floats weight = hn::Sub(hn::LoadU(d, through + i), hn::LoadU(d, through + i + 1));
       if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
-      if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
-      light(hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {weight});
+      hn::Store(weight, d, weights.of[0] + i);
     }
+    light<kSize>(weights);
     return through_ > scene_.cutoff;
+  }
+
+  // Optical depths behind steps of these depths: sums of four at a time, which do not wait for each other.
+  template <int kSize>
+  void addUp(const float* depth, float* after) {
+    for (int i = 0; i != kSize; i += 4) {
+      const float a = depth[i], b = a + depth[i + 1], c = b + depth[i + 2];
+      after[i] = a, after[i + 1] = b, after[i + 2] = c, after[i + 3] = c + depth[i + 3];
+    }
+    float sum = depth_;
+    for (int i = 0; i != kSize; i += 4) {
+      const float before = sum;
+      sum += after[i + 3];
+      for (int n = 0; n != 4; ++n) after[i + n] += before;
+      after[i + 3] = sum;
+    }
+    depth_ = sum;
   }
 
   // What the holdout leaves of every step, and of its opacity.
@@ -278,6 +424,7 @@ class Marcher {
       }
       throughColours_[c] = through[c][kSize];
     }
+    Weights<3> weights;
     for (std::size_t i = 0; i < kSize; i += lanes) {
       const Floats s = hn::Load(d, s_ + i), own = hn::Load(d, depth + i);
       Floats weight[3];
@@ -310,42 +457,47 @@ class Marcher {
         for (int c = 0; c != 3; ++c)
           weight[c] = hn::Mul(weight[c], hn::IfThenElseZero(some, hn::Div(colour[c], density)));
       }
-      for (Floats& one : weight) one = hn::Mul(one, seen);
-      light(s, hn::Load(d, ds_ + i), weight);
+      for (int c = 0; c != 3; ++c) hn::Store(hn::Mul(weight[c], seen), d, weights.of[c] + i);
     }
+    light<kSize>(weights);
     return std::max({throughColours_[0], throughColours_[1], throughColours_[2]}) > scene_.cutoff;
   }
 
   // Adds the light that steps of one weight, or of one for each colour, send to the eye.
-  template <int kColours>
-  void light(Floats s, Floats ds, const Floats (&weight)[kColours]) {
+  template <int kSize, int kColours>
+  void light(const Weights<kColours>& weights) {
     const Lanes d;
     for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-      const Floats column =
-          sampleBricks<LightVolume::kWidth, 0>(scene_.suns[sun], pointAt(ray_.suns[sun], s));
-      const Floats depth = hn::Mul(hn::Max(column, hn::Zero(d)), hn::Set(d, scene_.extinction));
-      for (int n = 0; n != scene_.octaves; ++n) {
-        if constexpr (kColours == 1) {
-          const float share = scene_.attenuation[n] * scene_.suns[sun].shadow[0];
-          const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, share)), hn::Set(d, 80.0f));
-          const Floats seen = hn::Mul(hn::Exp(d, hn::Neg(left)), weight[0]);
-          const float sum = hn::GetLane(hn::SumOfLanes(d, seen));
-          for (int c = 0; c != scene_.colours; ++c) result_.suns[sun][c] += sum * ray_.weight[sun][c][n];
-        } else {
-          for (int c = 0; c != kColours; ++c) {
-            const float share =
-                scene_.attenuation[n] * scene_.extinctionColour[c] * scene_.suns[sun].shadow[c];
-            const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, share)), hn::Set(d, 80.0f));
-            const Floats seen = hn::Mul(hn::Exp(d, hn::Neg(left)), weight[c]);
-            result_.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, seen)) * ray_.weight[sun][c][n];
+      alignas(64) float column[kSize];
+      sampleBlock<kSize, LightVolume::kWidth, 0>(scene_.suns[sun], ray_.suns[sun], s_, column);
+      for (int n = 0; n != scene_.octaves; ++n)
+        for (int c = 0; c != kColours; ++c) {
+          const float share = scene_.extinction * scene_.attenuation[n] *
+                              (kColours == 1 ? 1.0f : scene_.extinctionColour[c]) *
+                              scene_.suns[sun].shadow[c];
+          Floats sum = hn::Zero(d);
+          for (int i = 0; i != kSize; i += kLanes) {
+            const Floats left =
+                hn::Min(hn::Mul(hn::Load(d, column + i), hn::Set(d, share)), hn::Set(d, 80.0f));
+            sum = hn::MulAdd(hn::Exp(d, hn::Neg(left)), hn::Load(d, weights.of[c] + i), sum);
           }
+          const float all = hn::GetLane(hn::SumOfLanes(d, sum));
+          if constexpr (kColours == 1)
+            for (int k = 0; k != scene_.colours; ++k) result_.suns[sun][k] += all * ray_.weight[sun][k][n];
+          else
+            result_.suns[sun][c] += all * ray_.weight[sun][c][n];
         }
-      }
     }
-    for (std::size_t i = 0; i != scene_.locals.size(); ++i) local(i, s, ds, weight);
-    if (!scene_.scattered.empty()) scattered(s, weight);
-    if constexpr (kColours == 3)
-      if (scene_.glow[0]) scatteredGlow(s, weight);
+    if (scene_.locals.empty() && scene_.scattered.empty() && (kColours == 1 || !scene_.glow[0])) return;
+    for (int i = 0; i != kSize; i += kLanes) {
+      const Floats s = hn::Load(d, s_ + i), ds = hn::Load(d, ds_ + i);
+      Floats weight[kColours];
+      for (int c = 0; c != kColours; ++c) weight[c] = hn::Load(d, weights.of[c] + i);
+      for (std::size_t n = 0; n != scene_.locals.size(); ++n) local(n, s, ds, weight);
+      if (!scene_.scattered.empty()) scattered(s, weight);
+      if constexpr (kColours == 3)
+        if (scene_.glow[0]) scatteredGlow(s, weight);
+    }
   }
 
   // The same for a light at a place. Within a step distance and angle change as the light goes by: taken are
@@ -460,10 +612,10 @@ class Marcher {
 
   void scatteredGlow(Floats s, const Floats (&weight)[3]) {
     const Lanes d;
-    const Vec3i size = scene_.scatteredSize;
-    const Point p = clamped(pointAt(ray_.scattered, s), size);
+    Cells cells;
+    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, s), scene_.scatteredSize), cells);
     for (int c = 0; c != 3; ++c) {
-      const Floats there = trilinear(scene_.glow[c], hn::Zero(IntLanes()), p, size.x, size.x * size.y);
+      const Floats there = read(scene_.glow[c], cells);
       result_.emission[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[c])));
     }
   }
@@ -471,15 +623,15 @@ class Marcher {
   template <int kColours>
   void scattered(Floats s, const Floats (&weight)[kColours]) {
     const Lanes d;
-    const Vec3i size = scene_.scatteredSize;
-    const Point p = clamped(pointAt(ray_.scattered, s), size);
+    Cells cells;
+    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, s), scene_.scatteredSize), cells);
     std::size_t lattice = 0;
     for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
       float* result = light < scene_.lightCount() ? result_.suns[light] : result_.sky;
       for (int c = 0; c != scene_.colours; ++c) {
         const float* values = scene_.scattered[lattice++];
         if (!values) continue;
-        const Floats there = trilinear(values, hn::Zero(IntLanes()), p, size.x, size.x * size.y);
+        const Floats there = read(values, cells);
         result[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[kColours == 1 ? 0 : c])));
       }
     }
@@ -489,7 +641,9 @@ class Marcher {
   const MarchRay& ray_;
   MarchResult& result_;
   MarchRecord* record_;
-  const bool isHeld_;
+  const bool isHeld_, needsBegin_;
+  // Whether some densities of the block need no look-up.
+  bool someKnown_ = false;
   // Nothing farther away is seen.
   bool isHidden_ = false;
   std::size_t holdoutCursor_ = 0;
