@@ -23,14 +23,16 @@ inline void walkBricks(const MarchScene& scene, const LatticeRay& ray, float len
   constexpr float infinite = std::numeric_limits<float>::infinity();
   const Vec3i count = scene.density.count;
   Vec3i brick, forward;
-  Vec3f inverse, exits;
-  const auto exitOf = [&](int axis, int plane) {
-    return ray.direction[axis] == 0 ? infinite : (float(plane) * size - ray.origin[axis]) * inverse[axis];
-  };
+  // The ray meets plane n of an axis at n perPlane + zeroth: never, where it runs along it.
+  Vec3f perPlane, zeroth, exits;
+  const auto exitOf = [&](int axis, int plane) { return float(plane) * perPlane[axis] + zeroth[axis]; };
   for (int axis = 0; axis != 3; ++axis) {
     brick[axis] = std::clamp(int(std::floor(ray.origin[axis] / size)), 0, count[axis] - 1);
     forward[axis] = ray.direction[axis] > 0 ? 1 : 0;
-    inverse[axis] = 1.0f / ray.direction[axis];
+    const float inverse = 1.0f / ray.direction[axis];
+    const bool crosses = std::abs(ray.direction[axis]) > 1e-30f;
+    perPlane[axis] = crosses ? size * inverse : 0.0f;
+    zeroth[axis] = crosses ? -ray.origin[axis] * inverse : infinite;
     exits[axis] = exitOf(axis, brick[axis] + forward[axis]);
   }
   float s = 0.0f;
@@ -99,7 +101,7 @@ inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take
   // Enough steps to be worth a call.
   constexpr int kMany = 64;
   struct Run {
-    float start = 0.0f, ds = 0.0f, density = -1.0f, end = 0.0f;
+    float start = 0.0f, ds = 0.0f, perStep = 0.0f, density = -1.0f, end = 0.0f;
     int count = 0;
   } run;
   float cursor = 0.0f, depth = 0.0f, growth = 1.0f;
@@ -121,7 +123,8 @@ inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take
       // As far as the growth is about the same.
       const float end =
           thinnest * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest, ds)) : s1;
-      const int count = int(std::ceil((end - cursor) / ds));
+      const float perStep = ds == run.ds ? run.perStep : 1.0f / ds;
+      const int count = int(std::ceil((end - cursor) * perStep));
       // The last of steps longer than a voxel must not reach into a brick that differs.
       if (end == s1 && (uniform || (ray.isCut && s1 >= ray.length))) ds = (s1 - cursor) / float(count);
       const float start = cursor, density = range.isPoint() ? range.max : -1.0f;
@@ -134,7 +137,7 @@ inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take
         run.count += count;
       } else {
         if (run.count > 0 && !take(run.start, run.ds, run.count, run.density)) return goesOn = false;
-        run = {start, ds, density, cursor, count};
+        run = {start, ds, perStep, density, cursor, count};
         continue;
       }
       run.end = cursor;

@@ -58,7 +58,7 @@ HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offs
 #else
   if constexpr (hn::MaxLanes(D()) == 2) {
     return hn::LoadU(d, at[0] + offset);
-#if HWY_ARCH_X86
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
   } else if constexpr (hn::MaxLanes(D()) == 4) {
     const auto* first = reinterpret_cast<const double*>(at[0] + offset);
     const auto* second = reinterpret_cast<const double*>(at[1] + offset);
@@ -198,6 +198,56 @@ HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
   return read<kWidth, kBefore>(bricks, places);
 }
 
+// Lane n of the result is lane `from[n]` of x.
+struct LaneOrder {
+  alignas(64) std::int32_t from[kLanes];
+};
+HWY_INLINE Floats reordered(Floats x, [[maybe_unused]] const LaneOrder& order) {
+#if HWY_TARGET == HWY_SCALAR
+  return x;
+#else
+  return hn::TableLookupLanes(x, hn::SetTableIndices(Lanes(), order.from));
+#endif
+}
+template <class From>
+constexpr LaneOrder laneOrder(From&& from) {
+  LaneOrder order{};
+  for (int n = 0; n != kLanes; ++n) order.from[n] = from(n);
+  return order;
+}
+
+// The sums of each lane and those before it, and `before`.
+HWY_INLINE Floats runningSum(Floats x, Floats before) {
+  const Lanes d;
+  const IntLanes i;
+  const auto step = [&](auto width) HWY_ATTR {
+    constexpr int kWidth = decltype(width)::value;
+    if constexpr (kWidth < kLanes) {
+      static constexpr LaneOrder order =
+          laneOrder([](int n) { return n & kWidth ? (n & ~(kWidth - 1)) - 1 : n; });
+      const auto odd = hn::RebindMask(d, hn::Ne(hn::And(hn::Iota(i, 0), hn::Set(i, kWidth)), hn::Zero(i)));
+      x = hn::Add(x, hn::IfThenElseZero(odd, reordered(x, order)));
+    }
+  };
+  step(std::integral_constant<int, 1>());
+  step(std::integral_constant<int, 2>());
+  step(std::integral_constant<int, 4>());
+  step(std::integral_constant<int, 8>());
+  return hn::Add(x, before);
+}
+
+HWY_INLINE Floats broadcastLast(Floats x) {
+  static constexpr LaneOrder order = laneOrder([](int) { return kLanes - 1; });
+  return reordered(x, order);
+}
+
+// The lanes moved up by one, with the first one of `first` before them.
+HWY_INLINE Floats movedUp(Floats x, Floats first) {
+  const Lanes d;
+  static constexpr LaneOrder order = laneOrder([](int n) { return n > 0 ? n - 1 : 0; });
+  return hn::IfThenElse(hn::FirstN(d, 1), first, reordered(x, order));
+}
+
 // As many samples as a block has, at distances s along a ray. All places are found before the first value is
 // read, so that the processor need not wait for one vector before it starts the next.
 template <int kSize, int kWidth, int kBefore>
@@ -325,7 +375,13 @@ class Marcher {
       hn::Store(hn::Mul(hn::Mul(hn::Load(d, depth + i), extinction), hn::Load(d, ds_ + i)), d, depth + i);
     alignas(64) float after[kBlock];
     const float start = depth_;
-    addUp<kSize>(depth, after);
+    Floats behind = hn::Set(d, depth_);
+    for (std::size_t i = 0; i < kSize; i += lanes) {
+      const Floats sums = runningSum(hn::Load(d, depth + i), behind);
+      behind = broadcastLast(sums);
+      hn::Store(sums, d, after + i);
+    }
+    depth_ = hn::GetLane(behind);
     if (depth_ == start && !scene_.emission.table) return true;
     if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
@@ -337,38 +393,19 @@ class Marcher {
     if (record_) record(start, after, used);
     if (scene_.isColoured()) return flushColours<kSize>(depth, after);
 
-    alignas(64) float through[kBlock + 1];
-    through[0] = through_;
+    Weights<1> weights;
+    Floats through = hn::Set(d, through_);
     for (std::size_t i = 0; i < kSize; i += lanes) {
       const Floats tau = hn::Min(hn::Load(d, after + i), hn::Set(d, 80.0f));
-      hn::StoreU(hn::Exp(d, hn::Neg(tau)), d, through + 1 + i);
-    }
-    through_ = through[kSize];
-    Weights<1> weights;
-    for (std::size_t i = 0; i < kSize; i += lanes) {
-      Floats weight = hn::Sub(hn::LoadU(d, through + i), hn::LoadU(d, through + i + 1));
+      const Floats left = hn::Exp(d, hn::Neg(tau));
+      Floats weight = hn::Sub(movedUp(left, through), left);
       if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
       hn::Store(weight, d, weights.of[0] + i);
+      through = broadcastLast(left);
     }
+    through_ = hn::GetLane(through);
     light<kSize>(weights);
     return through_ > scene_.cutoff;
-  }
-
-  // Optical depths behind steps of these depths: sums of four at a time, which do not wait for each other.
-  template <int kSize>
-  void addUp(const float* depth, float* after) {
-    for (int i = 0; i != kSize; i += 4) {
-      const float a = depth[i], b = a + depth[i + 1], c = b + depth[i + 2];
-      after[i] = a, after[i + 1] = b, after[i + 2] = c, after[i + 3] = c + depth[i + 3];
-    }
-    float sum = depth_;
-    for (int i = 0; i != kSize; i += 4) {
-      const float before = sum;
-      sum += after[i + 3];
-      for (int n = 0; n != 4; ++n) after[i + n] += before;
-      after[i + 3] = sum;
-    }
-    depth_ = sum;
   }
 
   // What the holdout leaves of every step, and of its opacity.
