@@ -80,9 +80,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->each([&options](const std::string&) { options.samplesGiven = true; })
       ->default_str("4, or 64 with depth of field or motion blur");
   addIntegrator(app, options);
-  app.add_option("--seed", options.render.seed, "Moves the pattern of the samples.")
-      ->type_name("COUNT")
-      ->capture_default_str();
+  addCount(app, "--seed", options.seed, 0, 1 << 30, "Moves the pattern of the samples.");
   std::vector<std::string> layers = Film::layerNames();
   std::string names = layers.front();
   for (std::size_t i = 1; i != layers.size(); ++i) names += "," + layers[i];
@@ -125,7 +123,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
   if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
     result.render.nextCamera = laterCamera(volume, 1);
   result.path.aovs = result.render.aovs;
-  result.path.seed = result.render.seed;
+  result.path.seed = result.render.seed = std::uint32_t(seed);
   result.path.shutter = result.render.shutter;
   result.path.volumeMotion = result.render.volumeMotion;
   result.path.nextCamera = result.render.nextCamera;

@@ -26,6 +26,7 @@ struct PictureOptions : CameraOptions {
   Length step;
   RenderOptions render;
   bool samplesGiven = false;
+  int seed = 0;
   /// Path traces instead of marching; layers and seed are those of `render`.
   bool pathTraced = false;
   PathOptions path;

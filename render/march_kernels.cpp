@@ -60,9 +60,9 @@ HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offs
     return hn::LoadU(d, at[0] + offset);
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
   } else if constexpr (hn::MaxLanes(D()) == 4) {
-    const auto* first = reinterpret_cast<const double*>(at[0] + offset);
-    const auto* second = reinterpret_cast<const double*>(at[1] + offset);
-    return hn::Vec<D>{_mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(first), second))};
+    const auto* first = reinterpret_cast<const __m128i*>(at[0] + offset);
+    const auto* second = reinterpret_cast<const __m64*>(at[1] + offset);
+    return hn::Vec<D>{_mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64(first)), second)};
 #endif
   } else {
     const hn::Half<D> half;

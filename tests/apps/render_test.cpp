@@ -125,6 +125,8 @@ TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
                {"--phase hg:2", "--phase"},
                {"--octaves 0", "--octaves"},
                {"--samples 0", "--samples"},
+               {"--seed -1", "--seed"},
+               {"--ground=-1", "--ground"},
                {"--step 0", "--step"},
                {"--step -1", "--step"},
                {"--fov 200", "--fov"},
