@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "modeling/field.h"
 #include "modeling/mesh.h"
@@ -26,6 +27,11 @@ class NearestOnMesh {
 
   /// The nearest point within `radius` of `p`, or nothing. A tight radius makes the query much faster.
   std::optional<Hit> nearest(const Vec3f& p, float radius) const;
+
+  /// The triangles within `radius` of `p`, in order; a few beyond may be among them. Nothing if there are
+  /// more than `most`.
+  std::optional<std::vector<std::uint32_t>> trianglesNear(const Vec3f& p, float radius,
+                                                          std::size_t most) const;
 
   /// Box of the mesh.
   const Box& box() const { return box_; }

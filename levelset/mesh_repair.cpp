@@ -24,6 +24,7 @@
 #include "levelset/mesh_holes.h"
 #include "levelset/mesh_parts.h"
 #include "levelset/mesh_wrap.h"
+#include "levelset/vertex_attributes.h"
 #include "modeling/error.h"
 
 namespace nephele {
@@ -214,7 +215,7 @@ class Ladder {
     else
       report("split the surface where it touches itself");
     turnParts(filled.mesh, parts);
-    result_.mesh = detail::withMergedPositions(filled.mesh);
+    result_.mesh = detail::withVertexAttributesOf(result_.mesh, detail::withMergedPositions(filled.mesh));
     if (diagnose(result_.mesh).duplicateFaces > 0) result_.mesh = detail::withoutDuplicates(result_.mesh);
     requireFaces();
   }
@@ -255,7 +256,7 @@ class Ladder {
     progress_.begin("wrap");
     const double side = static_cast<double>(result_.before.box.longestSide());
     const double alpha = options_.wrapAlpha * side, offset = options_.wrapOffset * side;
-    result_.mesh = detail::wrapped(result_.mesh, alpha, offset);
+    result_.mesh = detail::withVertexAttributesOf(result_.mesh, detail::wrapped(result_.mesh, alpha, offset));
     // What was done before does not show in the wrap.
     result_.repairs.clear();
     report(

@@ -76,8 +76,10 @@ struct RepairedMesh {
 };
 
 /// The repair ladder. A good mesh passes through triangulated, untouched otherwise but for equal positions,
-/// which become one vertex (vertex attributes of the first; corner attributes stay). Attributes and groups
-/// survive until faces are added: a mesh with filled holes or wrapped has none.
+/// which become one vertex (vertex attributes of the first; corner attributes stay). Vertex attributes always
+/// survive: holes are filled between the vertices of their rims, and a wrap takes those of the closest point
+/// of the mesh. Corner attributes and groups survive until faces are added: a mesh with filled holes or
+/// wrapped has none.
 /// @throws Error saying what is wrong and which option would allow it (mode off on an open mesh; a flat mesh
 /// without volume; nothing left); Cancelled.
 RepairedMesh repairMesh(const Mesh& mesh, const MeshRepairOptions& options = {},

@@ -82,12 +82,21 @@ struct NearestOnMesh::Hierarchy {
     Vec3f offset{};
     float squared;
     std::uint32_t triangle = RTC_INVALID_GEOMETRY_ID;
+    /// Where to list what is near, if that is what is asked for.
+    std::vector<std::uint32_t>* list = nullptr;
+    std::size_t most = 0;
   };
 
   static bool visit(RTCPointQueryFunctionArguments* arguments) {
     auto& answer = *static_cast<Answer*>(arguments->userPtr);
     const Vec3f p(arguments->query->x, arguments->query->y, arguments->query->z);
     if (answer.hierarchy->discs[arguments->primID].isBeyond(p, arguments->query->radius)) return false;
+    if (answer.list) {
+      answer.list->push_back(arguments->primID);
+      if (answer.list->size() <= answer.most) return false;
+      arguments->query->radius = 0.0f;
+      return true;
+    }
     const std::uint32_t* corner = answer.hierarchy->corners + 3 * std::size_t(arguments->primID);
     const Vec3f* positions = answer.hierarchy->positions;
     const Vec3f q =
@@ -173,6 +182,21 @@ std::optional<NearestOnMesh::Hit> NearestOnMesh::nearest(const Vec3f& p, float r
   if (answer.triangle == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return Hit{Vec3f(Vec3d(local + answer.offset) + hierarchy_->centre), std::sqrt(answer.squared),
              answer.triangle};
+}
+
+std::optional<std::vector<std::uint32_t>> NearestOnMesh::trianglesNear(const Vec3f& p, float radius,
+                                                                       std::size_t most) const {
+  std::vector<std::uint32_t> triangles;
+  const Vec3f local(Vec3d(p) - hierarchy_->centre);
+  if (!isFinite(local)) return triangles;
+  RTCPointQuery query{local.x, local.y, local.z, 0.0f, radius};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  Hierarchy::Answer answer{hierarchy_.get(), {}, 0.0f, RTC_INVALID_GEOMETRY_ID, &triangles, most};
+  rtcPointQuery(hierarchy_->scene, &query, &context, nullptr, &answer);
+  if (triangles.size() > most) return std::nullopt;
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
 }
 
 namespace {

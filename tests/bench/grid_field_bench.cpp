@@ -1,6 +1,7 @@
 // Sampling of bricked grids, per point: our kernels, the plain loops beside them, and OpenVDB's BoxSampler on
 // an accessor, all on the same dense 128^3 of samples, along rays (0.4 voxels apart) and at random points.
-// And baking, per active voxel.
+// And baking, per active voxel. And look-ups of a painted vertex attribute near its surface, exact and by its
+// sparse grid.
 
 #include <benchmark/benchmark.h>
 #include <openvdb/openvdb.h>
@@ -8,11 +9,13 @@
 
 #include <random>
 
+#include "levelset/attribute_field.h"
 #include "levelset/grid_field.h"
 #include "levelset/grid_kernels.h"
 #include "modeling/field_ops.h"
 #include "modeling/noise.h"
 #include "modeling/shapes.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele {
 namespace {
@@ -121,6 +124,42 @@ void bakeNoisySphere(benchmark::State& state) {
   state.SetLabel(std::to_string(bricks) + " bricks, " + std::to_string(bytes >> 20) + " MB");
 }
 
+/// A torus of 65 536 triangles with a wavy attribute; the finest voxel of the grid is half an edge.
+struct Painted {
+  Mesh mesh = test::torusMesh(1, 0.4, 256, 128);
+  std::array<std::vector<float>, 3> points;
+  AttributeFieldOptions options;
+
+  Painted(AttributeFieldOptions::Spread spread, bool gridded) {
+    options = {.spread = spread, .voxelSize = gridded ? 0.01f : 0.0f, .band = 0.05f};
+    MeshAttribute wave{"wave", MeshAttribute::Domain::vertex, 1, {}};
+    for (const Vec3d& p : mesh.positions) wave.values.push_back(float(std::sin(5 * p.x) * std::cos(4 * p.y)));
+    mesh.attributes.push_back(std::move(wave));
+    // Voxel by voxel within a brick's width of each other, as the layers of a cloud ask for them.
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> u(-0.04, 0.04);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+      for (int axis = 0; axis < 3; ++axis)
+        points[std::size_t(axis)].push_back(float(mesh.positions[v][axis] + u(random)));
+  }
+};
+
+void attributeLookUp(benchmark::State& state, AttributeFieldOptions::Spread spread, bool gridded) {
+  Painted painted(spread, gridded);
+  const ScalarField field = attributeField(painted.mesh, "wave", painted.options);
+  std::vector<float> values(painted.points[0].size());
+  for (auto _ : state) {
+    field.eval({painted.points[0], painted.points[1], painted.points[2]}, values);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(std::int64_t(state.iterations() * values.size()));
+}
+
+void attributeGrid(benchmark::State& state, AttributeFieldOptions::Spread spread) {
+  const Painted painted(spread, true);
+  for (auto _ : state) benchmark::DoNotOptimize(attributeField(painted.mesh, "wave", painted.options).node());
+}
+
 BENCHMARK(values<sampleTrilinear>)->Name("trilinear")->Arg(0)->Arg(1);
 BENCHMARK(values<sampleTrilinearScalar>)->Name("trilinear_plain_loop")->Arg(0)->Arg(1);
 BENCHMARK(openvdbBoxSampler)->Name("trilinear_openvdb_box_sampler")->Arg(0)->Arg(1);
@@ -131,6 +170,14 @@ BENCHMARK(values<sampleTricubicScalar>)->Name("tricubic_plain_loop")->Arg(0)->Ar
 BENCHMARK(gradients<sampleTricubicGrad>)->Name("tricubic_and_gradient")->Arg(0)->Arg(1);
 BENCHMARK(gradients<sampleTricubicGradScalar>)->Name("tricubic_and_gradient_plain_loop")->Arg(0)->Arg(1);
 BENCHMARK(bakeNoisySphere)->Name("bake")->Arg(256)->Arg(512)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+using Spread = AttributeFieldOptions::Spread;
+BENCHMARK_CAPTURE(attributeLookUp, closest_exact, Spread::closest, false);
+BENCHMARK_CAPTURE(attributeLookUp, closest_gridded, Spread::closest, true);
+BENCHMARK_CAPTURE(attributeLookUp, spheres_exact, Spread::spheres, false);
+BENCHMARK_CAPTURE(attributeLookUp, spheres_gridded, Spread::spheres, true);
+BENCHMARK_CAPTURE(attributeGrid, closest, Spread::closest)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(attributeGrid, spheres, Spread::spheres)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace nephele

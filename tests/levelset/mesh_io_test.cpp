@@ -297,6 +297,37 @@ TEST(MeshIo, GltfAppliesNodesFlipsVAndTurnsMirroredFaces) {
   EXPECT_EQ(mesh.groups[0].name, "t");
 }
 
+TEST(MeshIo, GltfVertexColoursBecomeColor) {
+  // The triangle (0,0,0) (1,0,0) (0,1,0) with normalised bytes (255,0,51,255) (0,0,0,0) (0,255,0,102); the
+  // buffer was made with Python's base64.
+  const Mesh mesh = readText("a.gltf",
+                             R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
+          "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":1}}]}],
+          "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+                       {"bufferView":0,"byteOffset":36,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],
+          "bufferViews":[{"buffer":0,"byteLength":48}],"buffers":[{"byteLength":48,"uri":"data:application/octet-stream;base64,)"
+                             "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA/wAz/wAAAAAA/wBm"
+                             R"("}]})");
+  ASSERT_NE(find(mesh, "color"), nullptr);
+  EXPECT_EQ(find(mesh, "color")->width, 4);
+  EXPECT_EQ(find(mesh, "color")->values, (std::vector<float>{1, 0, 0.2f, 1, 0, 0, 0, 0, 0, 1, 0, 0.4f}));
+}
+
+TEST(MeshIo, PaintedMeshOfThisProjectHasItsAttributes) {
+  // Painted by data/paint_mesh.py with "amplitude = ramp(h, 0.1, 0.6)" and others; ramp is 3 t^2 - 2 t^3.
+  const Mesh mesh = readMesh(std::string(NEPHELE_SOURCE_DIR) + "/data/cloud_base_painted.ply");
+  const MeshAttribute* amplitude = find(mesh, "amplitude");
+  ASSERT_NE(amplitude, nullptr);
+  ASSERT_NE(find(mesh, "billow"), nullptr);
+  ASSERT_NE(find(mesh, "color"), nullptr);
+  const Box box = boundingBox(mesh);
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const double h = (mesh.positions[v].y - double(box.min.y)) / double(box.size().y);
+    const double t = std::clamp((h - 0.1) / 0.5, 0.0, 1.0);
+    ASSERT_NEAR(amplitude->values[v], t * t * (3 - 2 * t), 1e-5);
+  }
+}
+
 // ---- writing ----
 
 Mesh decorated() {

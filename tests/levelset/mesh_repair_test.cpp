@@ -9,6 +9,7 @@
 #include "modeling/error.h"
 #include "tests/support/known_meshes.h"
 #include "tests/support/test_data.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele {
 namespace {
@@ -104,6 +105,42 @@ TEST(MeshRepair, GoodMeshPassesUntouched) {
   EXPECT_EQ(repaired.mesh.attributes[0].values.size(), 72u);
   EXPECT_EQ(repaired.mesh.groups[0].faceCount, 12u);
   EXPECT_TRUE(repaired.after.manifold());
+}
+
+/// A vertex attribute of two numbers: twice x, and y - z.
+void paint(Mesh& mesh) {
+  MeshAttribute paint{"paint", MeshAttribute::Domain::vertex, 2, {}};
+  for (const Vec3d& p : mesh.positions)
+    paint.values.insert(paint.values.end(), {float(2 * p.x), float(p.y - p.z)});
+  mesh.attributes.push_back(std::move(paint));
+}
+
+TEST(MeshRepair, VertexAttributesSurviveMergedVerticesAndFilledHoles) {
+  for (const Mesh& source : {withoutFace(cube(), 3), test::unshared(withoutFace(cube(), 3))}) {
+    Mesh open = source;
+    paint(open);
+    const Mesh closed = repairMesh(open).mesh;
+    ASSERT_EQ(closed.attributes.size(), 1u);
+    EXPECT_EQ(closed.attributes[0].name, "paint");
+    Mesh expected = closed;
+    expected.attributes.clear();
+    paint(expected);
+    EXPECT_EQ(closed.attributes[0].values, expected.attributes[0].values);
+  }
+}
+
+TEST(MeshRepair, AWrapTakesVertexAttributesFromTheClosestPoint) {
+  Mesh mesh = cube();
+  paint(mesh);
+  const Mesh wrapped = repairMesh(mesh, {.mode = Mode::wrap, .wrapAlpha = 0.1, .wrapOffset = 0.02}).mesh;
+  ASSERT_EQ(wrapped.attributes.size(), 1u);
+  ASSERT_EQ(wrapped.attributes[0].values.size(), 2 * wrapped.positions.size());
+  for (std::size_t v = 0; v < wrapped.positions.size(); ++v) {
+    // The attribute is linear and the closest point of the unit cube is known.
+    const Vec3d p = min(max(wrapped.positions[v], Vec3d{0, 0, 0}), Vec3d{1, 1, 1});
+    EXPECT_NEAR(wrapped.attributes[0].values[2 * v], 2 * p.x, 1e-4);
+    EXPECT_NEAR(wrapped.attributes[0].values[2 * v + 1], p.y - p.z, 1e-4);
+  }
 }
 
 TEST(MeshRepair, HoleIsFilledWithTheMissingFace) {
