@@ -107,9 +107,19 @@ int runBody(const Verb& verb, ProgramRun& run, const CommonOptions& options) {
   return kFailed;
 }
 
+/// CLI11 takes "--flag=-1" as an order to switch the flag off.
+void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
+  const std::size_t equals = argument.find('=');
+  if (!argument.starts_with("--") || equals == std::string::npos) return;
+  const std::string name = argument.substr(0, equals);
+  const CLI::Option* option = app.get_option_no_throw(name);
+  if (option && option->get_items_expected_max() == 0)
+    refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
+}
+
 int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::string& commandLine) {
   CLI::App app(verb.summary, "nephele " + verb.name);
-  app.footer("Example:\n  " + verb.example);
+  app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
   app.get_formatter()->column_width(34);
   // Collected, so that a suggestion can be made for each.
   app.allow_extras();
@@ -120,6 +130,7 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
   const std::string who = "nephele " + verb.name;
   try {
     arguments = withConfigFile(app, std::move(arguments));
+    for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
     std::reverse(arguments.begin(), arguments.end());
     app.parse(std::move(arguments));
     for (const std::string& extra : app.remaining()) {

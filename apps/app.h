@@ -32,6 +32,9 @@ class Run : public Progress {
   /// what farm software is told. Where a verb does not say, every stage takes half of what is left.
   virtual void expect(double from, double to, int stages = 1) const = 0;
 
+  /// As `note`, for those who asked for more: shown with --verbose.
+  virtual void detail(std::string_view message) const = 0;
+
   /// A line of result on stdout.
   virtual void result(const std::string& line) const = 0;
 
@@ -47,11 +50,14 @@ struct Verb {
   /// Declares the verb's options, bound to variables that the body shares.
   std::function<void(CLI::App&)> bind;
   std::function<void(Run&)> body;
+  /// What --help says between the options and the example.
+  std::string notes{};
 };
 
 Verb levelsetVerb();
 Verb cloudVerb();
 Verb advectVerb();
+Verb wispsVerb();
 Verb meshVerb();
 Verb renderVerb();
 Verb turntableVerb();

@@ -1,6 +1,8 @@
 #pragma once
 
 #include "apps/app.h"
+#include "apps/cloud_quantities.h"
+#include "apps/field_sources.h"
 #include "levelset/vdb_io.h"
 
 namespace nephele::apps {
@@ -8,12 +10,12 @@ namespace nephele::apps {
 /// The one-line form of advection that the verb cloud has: noise frays the finished cloud.
 struct CloudAdvectionArguments {
   /// Rms way along each axis; 0: none.
-  Length strength{0, true};
+  FieldValue strength = parseFieldValue("--advect", "0", kAmplitude);
   Frequency frequency{10, true};
   int steps = 4;
 
   /// `density` carried along, or itself. Several octaves of noise, drawn from `seed`.
-  VdbGrid carried(const VdbGrid& density, double longestSide, int seed, Run& run) const;
+  VdbGrid carried(const VdbGrid& density, FieldSources& sources, int seed, Run& run) const;
 };
 
 /// Declares the options on `app`.

@@ -4,7 +4,9 @@
 
 #include "apps/app.h"
 #include "apps/cloud_advection.h"
+#include "apps/cloud_quantities.h"
 #include "apps/density_options.h"
+#include "apps/layer_recipe.h"
 #include "apps/shape_options.h"
 #include "levelset/cloud.h"
 
@@ -16,16 +18,32 @@ struct CloudArguments {
   DensityArguments density;
   CloudAdvectionArguments advection;
   std::string output, surface;
-  Length voxelSize, amplitude{2.5, true}, edgeThickness{0.35, true};
-  Frequency frequency{4.4, true};
+  Length voxelSize;
   int resolution = 256, seed = 0;
-  std::string noise = "perlin";
-  double lacunarity = 2.1, roughness = 0.55, billow = 1, billowScale = 1;
-  /// What needs no conversion; the rest is filled in by `resolved`.
+  FieldValue amplitude = parseFieldValue("--amplitude", "2.5%", kAmplitude);
+  FieldValue frequency = parseFieldValue("--frequency", "4.4x", kFrequency);
+  FieldValue lacunarity = parseFieldValue("--lacunarity", "2.1", kLacunarity);
+  FieldValue roughness = parseFieldValue("--roughness", "0.55", kRoughness);
+  FieldValue billow = parseFieldValue("--billow", "1", kBillow);
+  FieldValue billowScale = parseFieldValue("--billow-scale", "1", kBillowScale);
+  FieldValue edgeThickness = parseFieldValue("--edge-thickness", "0.35%", kEdgeThickness);
+  /// What needs no conversion: count and noise of the layers; the rest is filled in by `resolved`.
+  CumuloFractal fractal;
+  const CLI::Option* layersOption = nullptr;
+  std::optional<double> noiseTime, noisePeriod;
+  std::vector<LayerRecipe> recipe;
   CloudOptions cloud;
 
-  /// The library's options for a shape with this box.
-  CloudOptions resolved(const Box& shapeBox) const;
+  /// World units, for a shape with this longest side.
+  double voxel(double longestSide) const;
+  /// As typed, else those of the recipe, else the default.
+  int layerCount() const;
+  /// What the parameters of a cloud on `mesh` are made from.
+  FieldSources sources(const Mesh& mesh, const Run& run) const;
+  /// The library's options. @throws Error naming an option whose field cannot be made.
+  CloudOptions resolved(FieldSources& sources) const;
+  /// What noise layer `index` has: "worley, 3 octaves".
+  std::string noiseOf(std::size_t index) const;
 };
 
 /// Declares the options on `app`.

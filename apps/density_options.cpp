@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "modeling/field_ops.h"
+
 namespace nephele::apps {
 namespace {
 
@@ -17,15 +19,9 @@ std::pair<std::string, std::string> halves(const std::string& text, char separat
 /// The one number in `part` of the value `text`, within [low, high].
 double number(const std::string& option, const std::string& text, const std::string& part, double low,
               double high, const std::string& form) {
-  // parseNumbers names its whole text, so refusals are made here.
-  std::vector<double> parsed;
-  try {
-    parsed = parseNumbers(option, part, form);
-  } catch (const CLI::ValidationError&) {
-    refuseValue(option, text, form);
-  }
-  if (parsed.size() != 1 || parsed[0] < low || parsed[0] > high) refuseValue(option, text, form);
-  return parsed[0];
+  const auto parsed = parseNumber(part);
+  if (!parsed || *parsed < low || *parsed > high) refuseValue(option, text, form);
+  return *parsed;
 }
 
 void addFalloff(CLI::App& app, DensityArguments& a) {
@@ -137,8 +133,9 @@ void addThinOut(CLI::App& app, DensityArguments& a) {
 
 }  // namespace
 
-ScalarField DensityArguments::factor(const Box& shape, bool generated, std::uint32_t seed) const {
-  const double longest = shape.longestSide();
+ScalarField DensityArguments::factor(FieldSources& sources, bool generated, std::uint32_t seed) const {
+  const Box& shape = sources.box();
+  const double longest = sources.longestSide();
   DensityProfile profile{.low = shape.min.y,
                          .high = shape.max.y,
                          .interiorNoise = float(interiorNoise),
@@ -151,10 +148,12 @@ ScalarField DensityArguments::factor(const Box& shape, bool generated, std::uint
     profile.flatBase = {
         .height = float(flatBase.worldUnits(longest) + (flatBase.relative ? double(shape.min.y) : 0.0)),
         .softness = float(flatBaseSoftness.worldUnits(longest))};
-  return densityFactor(profile);
+  const ScalarField all = densityFactor(profile);
+  return density.isConstant() && density.stops[0].amount.value == 1 ? all : all * sources.field(density);
 }
 
 void addDensityOptions(CLI::App& app, DensityArguments& arguments) {
+  addFieldValue(app, "--density", arguments.density, "Multiplies the density.");
   addFalloff(app, arguments);
   addInteriorNoise(app, arguments);
   addFlatBase(app, arguments);

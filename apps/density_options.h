@@ -3,14 +3,15 @@
 #include <optional>
 #include <string>
 
-#include "apps/options.h"
-#include "modeling/box.h"
+#include "apps/cloud_quantities.h"
+#include "apps/field_sources.h"
 #include "modeling/density_profile.h"
 
 namespace nephele::apps {
 
 /// How the density of a cloud rises and varies, as typed.
 struct DensityArguments {
+  FieldValue density = parseFieldValue("--density", "1", kDensity);
   /// Of the rise over the edge; empty: smooth.
   std::optional<float> edgeExponent;
   double interiorNoise = 0;
@@ -23,8 +24,8 @@ struct DensityArguments {
   std::vector<RampStop> heightProfile;
   double thinOut = 0, thinOutFrom = 0.5;
 
-  /// What the density of a cloud on a shape with this box is multiplied by.
-  ScalarField factor(const Box& shape, bool generated, std::uint32_t seed) const;
+  /// What the density of a cloud on the shape of `sources` is multiplied by.
+  ScalarField factor(FieldSources& sources, bool generated, std::uint32_t seed) const;
 };
 
 /// Declares the options on `app`.

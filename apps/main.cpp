@@ -7,7 +7,7 @@ int main(int argc, char** argv) {
   // The allocator raises this limit by itself and then keeps what large vectors leave behind, stage after
   // stage.
   mallopt(M_MMAP_THRESHOLD, 1 << 17);
-  return runProgram(
-      argc, argv,
-      {levelsetVerb(), cloudVerb(), advectVerb(), meshVerb(), renderVerb(), turntableVerb(), infoVerb()});
+  return runProgram(argc, argv,
+                    {levelsetVerb(), cloudVerb(), advectVerb(), wispsVerb(), meshVerb(), renderVerb(),
+                     turntableVerb(), infoVerb()});
 }

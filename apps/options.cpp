@@ -11,7 +11,6 @@
 #include <optional>
 
 namespace nephele::apps {
-namespace {
 
 std::optional<double> parseNumber(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
@@ -20,8 +19,6 @@ std::optional<double> parseNumber(std::string_view text) {
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
 }
-
-}  // namespace
 
 void refuseValue(const std::string& name, const std::string& text, const std::string& allowed) {
   const std::size_t comma = name.rfind(',');

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -85,6 +86,9 @@ CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& targ
 
 /// --repair, the same for every verb that takes a mesh.
 CLI::Option* addRepair(CLI::App& app, MeshRepairOptions::Mode& target);
+
+/// The finite number that all of `text` is, or nothing.
+std::optional<double> parseNumber(std::string_view text);
 
 /// The numbers of a comma-separated list, or a usage error that names `option`, `text` and the `form` wanted.
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, const std::string& form);

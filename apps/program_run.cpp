@@ -190,6 +190,10 @@ void ProgramRun::note(std::string_view message) const {
   fmt::print(stderr, "nephele {}: {}\n", verb_, message);
 }
 
+void ProgramRun::detail(std::string_view message) const {
+  if (options_.verbose) note(message);
+}
+
 bool ProgramRun::cancelled() const {
   return receivedSignal != 0;
 }

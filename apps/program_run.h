@@ -31,6 +31,7 @@ class ProgramRun : public Run {
   void note(std::string_view message) const override;
   bool cancelled() const override;
   void expect(double from, double to, int stages) const override;
+  void detail(std::string_view message) const override;
   void result(const std::string& line) const override;
 
   /// Ends the last stage and clears the bar. Call before anything else is printed.

@@ -340,6 +340,10 @@ class Baker {
   /// The own samples of one brick, component by component.
   void evaluate(const FieldNode<T>& node, const Vec3i& brick, float* samples, Scratch& scratch) const {
     const VoxelBox own = ownVoxels(brick, 1);
+    if (voxels_.intersection(own).isEmpty()) {
+      for (int c = 0; c < kLanes; ++c) std::fill_n(samples + c * kOwn, kOwn, background_[c]);
+      return;
+    }
     Scratch::Frame frame(scratch);
     const BlockLanes<3> xyz = frame.template lanes<3>();
     const BlockLanes<kLanes> out = frame.template lanes<kLanes>();
@@ -348,12 +352,16 @@ class Baker {
     for (int i = 0; i < kBrick; ++i)
       positions[i] = position(min(max(own.first + Vec3i{i, i, i}, voxels_.first), voxels_.last));
     for (int done = 0; done < kOwn; done += kBlockSize) {
+      constexpr int kPlanes = kBlockSize / (kBrick * kBrick);
+      const int z = own.first.z + done / (kBrick * kBrick);
+      // Blocks wholly outside are filled below.
+      if (z > voxels_.last.z || z + kPlanes - 1 < voxels_.first.z) continue;
       for (int row = 0; row < kBlockSize / kBrick; ++row) {
-        const int y = row % kBrick, z = (done / kBrick + row) / kBrick;
+        const int y = row % kBrick, plane = (done / kBrick + row) / kBrick;
         for (int x = 0; x < kBrick; ++x) {
           xyz[0][row * kBrick + x] = positions[x].x;
           xyz[1][row * kBrick + x] = positions[y].y;
-          xyz[2][row * kBrick + x] = positions[z].z;
+          xyz[2][row * kBrick + x] = positions[plane].z;
         }
       }
       node.eval(scratch.pointBlock(xyz, kBlockSize), out, scratch);

@@ -50,6 +50,16 @@ double varyingShare(const ScalarField& factor, const Box& box) {
   return double(varying) / kSlices;
 }
 
+double square(double x) {
+  return x * x;
+}
+
+float thickestEdge(const CloudOptions& options) {
+  const float thickest = options.edgeThickness.range(Box::everywhere()).max;
+  require(std::isfinite(thickest), "makeCloud: edgeThickness has no finite range");
+  return thickest;
+}
+
 }  // namespace
 
 Mesh cloudShapeMesh(const CloudShapeOptions& options, const Progress& progress) {
@@ -72,8 +82,9 @@ RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair,
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
   require(options.voxelSize > 0,
           "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
-  const std::vector<CumuloLayer> layers = cumuloLayers(options.layers);
-  const float edge = options.edgeThickness / 2;
+  require(!options.layers.empty(), "makeCloud: there must be at least one layer");
+  const std::vector<CumuloLayer>& layers = options.layers;
+  const float edge = thickestEdge(options) / 2;
   progress.begin("distance");
   const ScalarField base = meshDistance(mesh,
                                         {.voxelSize = baseVoxelSize(layers, options.voxelSize),
@@ -104,20 +115,26 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
 }
 
 double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
-  // Measured on the bunny at resolutions 256 to 1024. Displaced surfaces are larger than their base; per area
-  // of the base in voxels, the result then holds some 30 voxels and the distance to the base, with borders,
-  // some 100.
-  constexpr double kGrowth = 1.5, kResultVoxels = 30, kBaseVoxels = 100;
-  const std::vector<CumuloLayer> layers = cumuloLayers(options.layers);
+  // Measured, bytes: the program itself; the mesh and what finds its closest points, per face; the distance
+  // to it, per voxel of its area; and both while they are made. The result stores leaves of 8 voxels on an
+  // edge that layers make larger.
+  constexpr double kProgram = 4.8e7, kFace = 160, kFaceWork = 330, kBase = 150, kBaseWork = 320, kLeaf = 8;
+  constexpr double kGrowth = 1.5, kCaution = 1.1;
+  require(!options.layers.empty(), "estimatedCloudBytes: there must be at least one layer");
   const double area = surfaceArea(mesh), voxel = options.voxelSize;
-  const double baseVoxel = baseVoxelSize(layers, options.voxelSize);
+  const double baseVoxels = area / square(double(baseVoxelSize(options.layers, options.voxelSize)));
   const double grids = options.withSurface ? 2 : 1;
   const double varying =
       std::abs(signedVolume(mesh)) * varyingShare(options.densityFactor, boundingBox(mesh));
-  return estimatedCumuloBytes(layers, options.voxelSize, area * kGrowth) +
-         sizeof(float) * area *
-             (kBaseVoxels / (baseVoxel * baseVoxel) + kResultVoxels * grids / (voxel * voxel)) +
-         sizeof(float) * kGrowth * varying / (voxel * voxel * voxel);
+  const CumuloBytes layers = estimatedCumuloBytes(options.layers, options.voxelSize, area, boundingBox(mesh));
+  const double growth = std::min(1.45 + 0.17 * double(options.layers.size()), 2.2);
+  const double stored = growth * (kLeaf + double(thickestEdge(options)) / voxel) * grids;
+  const double result =
+      sizeof(float) * (area * stored / square(voxel) + kGrowth * varying / (voxel * voxel * voxel));
+  const double faces = double(mesh.faceCount());
+  const double making = kFaceWork * faces + kBaseWork * baseVoxels;
+  const double base = kFace * faces + kBase * baseVoxels;
+  return kCaution * (kProgram + std::max({making, base + layers.peak, base + layers.kept + result}));
 }
 
 }  // namespace nephele

@@ -13,14 +13,15 @@ namespace nephele {
 
 /// Everything between a mesh and the grids of its cloud. Lengths in world units.
 struct CloudOptions {
-  CumuloFractal layers;
+  /// At least one; see `cumuloLayers`.
+  std::vector<CumuloLayer> layers;
   /// > 0.
   float voxelSize = 0.0f;
   int newtonSteps = 5;
   int medialSmoothing = 4;
   CumuloGridOptions::Renormalise renormalise = CumuloGridOptions::Renormalise::off;
   /// > 0; see CloudDensityOptions.
-  float edgeThickness = 0.0f;
+  ScalarField edgeThickness{0.0f};
   /// Shape of the rise over the edge, and what the density is multiplied by; see CloudDensityOptions.
   std::optional<float> edgeExponent{};
   ScalarField densityFactor{1.0f};
@@ -39,7 +40,8 @@ struct Cloud {
 /// needs, layers, density. @throws Error for options outside their range; Cancelled.
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress = silent());
 
-/// Memory that `makeCloud` needs, bytes, from the area of the mesh.
+/// Memory that a program needs for `makeCloud`, bytes, from the area of the mesh: -10 to +50 % of what was
+/// measured. @throws Error if there is no layer.
 double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options);
 
 /// The surface of a generated shape, sampled at 1/96 of its size: what `makeCloud` grows a cloud on where

@@ -34,32 +34,47 @@ constexpr int kLeaf = int(Leaf::DIM);
 constexpr int kBlock = 32;
 constexpr int kLevelSetHalfWidth = 3;
 
-/// What a value of l becomes in the file.
+/// What values of l become in the file.
 class DensityRule {
  public:
-  DensityRule(float edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
-  /// Values of l at and beyond whose ends the file's value does not change.
-  Interval band() const { return {-edge_ / 2, edge_ / 2}; }
-  float operator()(float l) const {
-    const float t = std::clamp(l / edge_ + 0.5f, 0.0f, 1.0f);
-    if (exponent_) return *exponent_ == 1 ? t : std::pow(t, *exponent_);
-    return t * t * (3 - 2 * t);
+  DensityRule(const ScalarField& edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
+  /// Values of l in `box` at and beyond whose ends the file's values do not change.
+  Interval band(const Box& box) const {
+    const float edge = edge_.range(box).max;
+    return {-edge / 2, edge / 2};
+  }
+  DensityRule restrictedTo(const Box& box) const { return {edge_.restrictedTo(box), exponent_}; }
+  void apply(const PointSpans& points, std::span<float> l) const {
+    std::array<float, Leaf::SIZE> edge;
+    edge_.eval(points, std::span<float>(edge));
+    for (std::size_t i = 0; i < l.size(); ++i) l[i] = value(l[i], edge[i]);
   }
   bool isActive(float value) const { return value > 0; }
   float background() const { return 0; }
+  float inside() const { return 1; }
 
  private:
-  float edge_;
+  float value(float l, float edge) const {
+    const float t = std::clamp(l / edge + 0.5f, 0.0f, 1.0f);
+    if (exponent_) return *exponent_ == 1 ? t : std::pow(t, *exponent_);
+    return t * t * (3 - 2 * t);
+  }
+
+  ScalarField edge_;
   std::optional<float> exponent_;
 };
 
 class LevelSetRule {
  public:
   explicit LevelSetRule(float halfWidth) : halfWidth_(halfWidth) {}
-  Interval band() const { return {-halfWidth_, halfWidth_}; }
-  float operator()(float l) const { return -std::clamp(l, -halfWidth_, halfWidth_); }
+  Interval band(const Box&) const { return {-halfWidth_, halfWidth_}; }
+  LevelSetRule restrictedTo(const Box&) const { return *this; }
+  void apply(const PointSpans&, std::span<float> l) const {
+    for (float& value : l) value = -std::clamp(value, -halfWidth_, halfWidth_);
+  }
   bool isActive(float value) const { return std::abs(value) < halfWidth_; }
   float background() const { return halfWidth_; }
+  float inside() const { return -halfWidth_; }
 
  private:
   float halfWidth_;
@@ -79,14 +94,15 @@ template <class Rule>
 class TreeBuilder {
  public:
   TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor)
-      : cloud_(cloud), voxel_(voxelSize), rule_(rule), factor_(factor), settled_(rule.band()) {
-    settled_.min -= cloud.estimateError;
-    settled_.max += cloud.estimateError;
-  }
+      : cloud_(cloud),
+        voxel_(voxelSize),
+        rule_(rule),
+        factor_(factor),
+        box_(cloud.box.expanded(rule.band(Box::everywhere()).max)) {}
 
   openvdb::FloatTree::Ptr build(const Progress& progress) const {
     const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
-    const Vec3f low = cloud_.box.min, high = cloud_.box.max;
+    const Vec3f low = box_.min, high = box_.max;
     const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
     const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
     auto tree = std::make_shared<openvdb::FloatTree>(rule_.background());
@@ -98,8 +114,8 @@ class TreeBuilder {
         for (std::size_t b = begin; b < end; ++b) {
           progress.check();
           const Vec3i block = (corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock;
-          split(block, kBlock, {estimate, factor_.restrictedTo(boxOfVoxels(block, {kBlock, kBlock, kBlock}))},
-                slab[b]);
+          const Box box = boxOfVoxels(block, {kBlock, kBlock, kBlock});
+          split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, slab[b]);
         }
       });
       move(slab, *tree);
@@ -120,39 +136,50 @@ class TreeBuilder {
     const float margin = 2 * cloud_.estimateVoxelSize;
     // A voxel more than the blocks' own, so that even a cloud that lies between two voxels leaves some box.
     const Box around = boxOfVoxels(firstBlock * kBlock, blocks * kBlock).expanded(margin + voxel_);
+    const Interval settled = settledBand(rule_.band(around));
     return bake(cloud_.estimate, {.voxelSize = cloud_.estimateVoxelSize,
-                                  .box = around.intersection(cloud_.box.expanded(margin)),
-                                  .band = {settled_.min - margin, settled_.max + margin}});
+                                  .box = around.intersection(box_.expanded(margin)),
+                                  .band = {settled.min - margin, settled.max + margin}});
+  }
+
+  /// Estimates beyond whose ends the exact value of l lies beyond those of `band`.
+  Interval settledBand(const Interval& band) const {
+    return {band.min - cloud_.estimateError, band.max + cloud_.estimateError};
   }
 
   /// What blocks are read from.
   struct Source {
     ScalarField estimate, factor;
+    Rule rule;
   };
 
   void split(const Vec3i& first, int width, const Source& source, Block& block) const {
     const Box box = boxOfVoxels(first, {width, width, width});
-    const Interval l = source.estimate.range(box);
-    if (l.max <= settled_.min) return;
+    const Interval l = source.estimate.range(box), band = source.rule.band(box), settled = settledBand(band);
+    if (l.max <= settled.min) return;
     const Interval factor = source.factor.range(box);
     if (factor == Interval::of(0)) return;
-    if (l.min >= settled_.max && factor.isPoint()) {
+    if (l.min >= settled.max && factor.isPoint()) {
       for (int z = 0; z < width; z += kLeaf)
         for (int y = 0; y < width; y += kLeaf)
           for (int x = 0; x < width; x += kLeaf)
-            block.tiles.push_back({{first.x + x, first.y + y, first.z + z}, insideValue() * factor.min});
+            block.tiles.push_back({{first.x + x, first.y + y, first.z + z}, rule_.inside() * factor.min});
       return;
     }
-    if (width == kLeaf) return evaluate(first, source, l.min >= settled_.max, factor, block);
+    if (width == kLeaf) return evaluate(first, source, {band, settled, l.min >= settled.max, factor}, block);
     const int half = width / 2;
     for (int i = 0; i < 8; ++i)
       split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, source, block);
   }
 
-  float insideValue() const { return rule_(rule_.band().max); }
+  /// What is known about a leaf by ranges.
+  struct Known {
+    Interval band, settled;
+    bool isInside;
+    Interval factor;
+  };
 
-  void evaluate(const Vec3i& first, const Source& source, bool whole, const Interval& factorRange,
-                Block& block) const {
+  void evaluate(const Vec3i& first, const Source& source, const Known& known, Block& block) const {
     constexpr int kCount = int(Leaf::SIZE);
     std::array<float, kCount> x, y, z, l;
     for (int i = 0; i < kCount; ++i) {
@@ -161,8 +188,8 @@ class TreeBuilder {
       y[i] = float(first.y + (i >> 3 & 7)) * voxel_;
       z[i] = float(first.z + (i & 7)) * voxel_;
     }
-    if (whole)
-      l.fill(settled_.max);
+    if (known.isInside)
+      l.fill(known.settled.max);
     else
       source.estimate.eval({x, y, z}, std::span<float>(l));
 
@@ -170,7 +197,7 @@ class TreeBuilder {
     std::array<int, kCount> place;
     std::size_t count = 0;
     for (int i = 0; i < kCount; ++i) {
-      if (l[i] <= settled_.min || l[i] >= settled_.max) continue;
+      if (l[i] <= known.settled.min || l[i] >= known.settled.max) continue;
       nearX[count] = x[i];
       nearY[count] = y[i];
       nearZ[count] = z[i];
@@ -183,21 +210,22 @@ class TreeBuilder {
     }
 
     bool inside = true, outside = true;
-    for (float& value : l) {
-      inside &= value >= rule_.band().max;
-      outside &= value <= rule_.band().min;
+    for (const float value : l) {
+      inside &= value >= known.band.max;
+      outside &= value <= known.band.min;
     }
     const openvdb::Coord origin(first.x, first.y, first.z);
-    if (inside && factorRange.isPoint()) block.tiles.push_back({origin, insideValue() * factorRange.min});
-    if ((inside && factorRange.isPoint()) || outside) return;
+    if (inside && known.factor.isPoint()) block.tiles.push_back({origin, rule_.inside() * known.factor.min});
+    if ((inside && known.factor.isPoint()) || outside) return;
+    source.rule.apply({x, y, z}, std::span<float>(l));
     std::array<float, kCount> factor;
-    if (factorRange.isPoint())
-      factor.fill(factorRange.min);
+    if (known.factor.isPoint())
+      factor.fill(known.factor.min);
     else
       source.factor.eval({x, y, z}, std::span<float>(factor));
     auto leaf = std::make_unique<Leaf>(origin, rule_.background(), false);
     for (int i = 0; i < kCount; ++i) {
-      const float value = rule_(l[i]) * factor[i];
+      const float value = l[i] * factor[i];
       leaf->buffer().setValue(openvdb::Index(i), value);
       leaf->setActiveState(openvdb::Index(i), rule_.isActive(value));
     }
@@ -219,7 +247,8 @@ class TreeBuilder {
   float voxel_;
   Rule rule_;
   ScalarField factor_;
-  Interval settled_;
+  /// Where the edge can be.
+  Box box_;
 };
 
 template <class Rule>
@@ -242,8 +271,10 @@ VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& opti
                      const Progress& progress) {
   require(options.voxelSize > 0,
           "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
-  require(options.edgeThickness > 0,
-          "cloudDensity: edgeThickness must be > 0, got " + std::to_string(options.edgeThickness));
+  const Interval edge = options.edgeThickness.range(Box::everywhere());
+  require(edge.min > 0 && std::isfinite(edge.max),
+          "cloudDensity: edgeThickness must be > 0 and finite, got " +
+              std::to_string(edge.min > 0 ? edge.max : edge.min));
   require(!options.edgeExponent || (*options.edgeExponent > 0 && std::isfinite(*options.edgeExponent)),
           "cloudDensity: edgeExponent must be > 0, got " + std::to_string(options.edgeExponent.value_or(0)));
   const Interval factor = options.factor.range(cloud.box);

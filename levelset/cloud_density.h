@@ -10,9 +10,9 @@ namespace nephele {
 struct CloudDensityOptions {
   /// World units, > 0. Voxel centres lie at integer multiples of it.
   float voxelSize = 0.0f;
-  /// Width in world units, > 0, over which the density rises from 0 to 1, half of it to either side of the
-  /// surface.
-  float edgeThickness = 0.0f;
+  /// Width in world units, > 0 and bounded, over which the density rises from 0 to 1, half of it to either
+  /// side of the surface.
+  ScalarField edgeThickness{0.0f};
   /// How the density rises over the edge: t^edgeExponent, t from 0 to 1 over its width; 1 is linear, more is
   /// a thinner rim. > 0. Empty: t t (3 - 2 t).
   std::optional<float> edgeExponent{};

@@ -15,7 +15,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <limits>
+#include <deque>
 #include <string>
 
 #include "levelset/grid_field.h"
@@ -46,16 +46,31 @@ constexpr float kLargestSlope = 3.2f;
 constexpr float kEstimateErrorVoxels = 1.0f;
 /// A surface point counts as found within this many voxels.
 constexpr float kFoundVoxels = 0.1f;
-/// Bricks whose surface points are searched for once more, to count those that were not found.
+/// Bricks of a part whose surface points are searched for once more, to count those that were not found: as
+/// many as this, but no more than one of so many.
 constexpr std::size_t kSearchedBricks = 128;
-/// Thickness of the parts that a layer is baked in.
+constexpr std::size_t kLeastStride = 8;
+/// A layer with no more positions of bricks than this is baked in one piece: some hundred megabytes.
+constexpr double kWholePositions = 1 << 20;
+/// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
+/// copy less from their neighbours.
 constexpr int kPartBricks = 8;
+constexpr double kPartPositions = 1 << 18;
+/// Of a layer's time, the rest being spent on the sum for the next one.
+constexpr double kShareOfBake = 0.85;
 constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
 
 /// Width kept on either side of the band of a layer. Displacement ends at three quarters of it.
 float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, const CumuloGridOptions& options) {
   const float voxel = cumuloVoxelSize(layers, index, options.voxelSize);
   return std::max(kMarginVoxels * voxel, options.edge * 4 / 3 + voxel);
+}
+
+/// Of the displacement of a layer, where it does not jump.
+float largestSlope(const CumuloStep& step) {
+  const CumuloLayer& layer = *step.layer;
+  if (layer.steepest) return *layer.steepest * layer.amplitude.range(Box::everywhere()).max;
+  return kLargestSlope * step.bound * layer.frequency;
 }
 
 float coarsestVoxel(const std::vector<CumuloLayer>& layers, float voxelSize) {
@@ -102,49 +117,174 @@ class GrownNode final : public FieldNode<float> {
   NodePtr<float> before_, level_, displacement_;
 };
 
+/// The displacement of a layer for a bake that leaves out what cannot matter: its range is 0 where amplitudes
+/// near by are too small for this layer and those after it to bring the sum to the surface.
+class NeededNode final : public FieldNode<float> {
+ public:
+  NeededNode(const CumuloStep& step, const std::vector<CumuloLayer>& layers, float voxelSize)
+      : displacement_(step.displacement.node()),
+        level_(step.level.node()),
+        reach_(step.reach),
+        margin_(step.margin),
+        voxelSize_(voxelSize) {
+    for (std::size_t i = step.index; i < layers.size(); ++i)
+      heights_.push_back({layers[i].amplitude.node(), layers[i].noise.range(Box::everywhere()).magnitude()});
+  }
+
+  static bool isOfUse(const CumuloStep& step, const std::vector<CumuloLayer>& layers) {
+    return std::any_of(
+        layers.begin() + std::ptrdiff_t(step.index), layers.end(),
+        [](const CumuloLayer& layer) { return !layer.amplitude.range(Box::everywhere()).isPoint(); });
+  }
+
+  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
+    displacement_->eval(points, values, scratch);
+  }
+
+  Interval range(const Box& box) const override {
+    const Interval range = displacement_->range(box);
+    if (range.isPoint()) return range;
+    const Interval level = level_->range(box);
+    if (level.max > 0) return range;
+    // Levels rise from layer to layer: no later surface point is farther.
+    const float depth = std::min(-level.min, reach_ + margin_);
+    const Box near = box.expanded(detail::farthestSurfacePoint(depth, voxelSize_));
+    float reach = 0;
+    for (const Height& height : heights_) reach += height.amplitude->range(near).max * height.noiseBound;
+    return level.max < -reach - detail::kOuterShare * margin_ ? Interval::of(0) : range;
+  }
+
+ private:
+  struct Height {
+    NodePtr<float> amplitude;
+    float noiseBound;
+  };
+
+  NodePtr<float> displacement_, level_;
+  std::vector<Height> heights_;
+  float reach_, margin_, voxelSize_;
+};
+
 /// Bricks begin <= z < end.
 struct Slab {
   int begin, end;
+
+  bool contains(int z) const { return z >= begin && z < end; }
 };
 
-/// Puts chosen bricks of packed grids of one voxel size together.
-class Joined {
+/// How a layer is cut into parts.
+struct Parts {
+  Slab all;
+  int thickness, halo;
+
+  int count() const { return (all.end - all.begin + thickness - 1) / thickness; }
+  Slab operator[](int part) const {
+    return {all.begin + part * thickness, std::min(all.begin + (part + 1) * thickness, all.end)};
+  }
+  /// A part with its neighbours as far as they can reach it through the smoothing.
+  Slab around(int part) const {
+    const Slab own = (*this)[part];
+    return {std::max(own.begin - halo, all.begin), std::min(own.end + halo, all.end)};
+  }
+};
+
+/// An empty grid for displacements at the bricks of `slab` inside a box.
+std::shared_ptr<BrickGrid> emptyGrid(const Box& box, float voxelSize, const Slab& slab) {
+  auto grid = std::make_shared<BrickGrid>();
+  grid->voxelSize = voxelSize;
+  grid->indexToWorld.linear = Mat3f::scaling(voxelSize);
+  grid->worldToIndex.linear = Mat3f::scaling(1.0f / voxelSize);
+  for (int axis = 0; axis < 3; ++axis) {
+    grid->firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+    grid->brickCount[axis] =
+        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - grid->firstBrick[axis];
+  }
+  grid->firstBrick.z = slab.begin;
+  grid->brickCount.z = slab.end - slab.begin;
+  const Vec3i n = grid->brickCount;
+  grid->table.resize(std::size_t(n.x) * n.y * n.z);
+  grid->ranges.push_back(Interval::of(0));
+  return grid;
+}
+
+/// `reach` is how far smoothing sees, in voxels.
+Parts partsOf(const Box& box, float voxelSize, int reach) {
+  const auto bricks = [&](int axis) {
+    return Slab{int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1,
+                int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2};
+  };
+  const auto size = [&](int axis) { return bricks(axis).end - bricks(axis).begin; };
+  const double across = double(size(0)) * size(1);
+  Parts parts{bricks(2), size(2), 1 + (reach + 1 + BrickGrid::kAfter) / BrickGrid::kBrick};
+  if (across * size(2) > kWholePositions)
+    parts.thickness = std::max({kPartBricks, parts.halo, int(kPartPositions / across)});
+  return parts;
+}
+
+/// A slab of a layer as it was sampled, with samples beside it that are of no use.
+struct Part {
+  Slab slab;
+  std::shared_ptr<BrickGrid> grid;
+};
+
+/// The bricks of `slab` from those of neighbouring parts, each at a place of its own, with borders. May be
+/// the grid of a part that needs no other.
+std::shared_ptr<BrickGrid> windowOf(const std::deque<Part>& parts, const Slab& slab, const Box& box,
+                                    float voxelSize) {
+  constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
+  if (parts.size() == 1 && placedBricks(*parts[0].grid).size() + 1 == parts[0].grid->poolSize())
+    return parts[0].grid;
+  std::shared_ptr<BrickGrid> window = emptyGrid(box, voxelSize, slab);
+  std::vector<const float*> sources{nullptr};
+  for (const Part& part : parts) {
+    const Vec3i first = max(window->firstBrick, part.grid->firstBrick);
+    const Vec3i end =
+        min(window->firstBrick + window->brickCount, part.grid->firstBrick + part.grid->brickCount);
+    Vec3i b;
+    for (b.z = std::max(first.z, part.slab.begin); b.z < std::min(end.z, part.slab.end); ++b.z)
+      for (b.y = first.y; b.y < end.y; ++b.y)
+        for (b.x = first.x; b.x < end.x; ++b.x) {
+          const std::int32_t pool = part.grid->poolIndex(b);
+          if (pool == 0) continue;
+          window->table[window->tableIndex(b)] = std::int32_t(sources.size());
+          sources.push_back(part.grid->brick(pool));
+        }
+  }
+  detail::reserveLarge(window->values, sources.size() * kVolume);
+  window->values.resize(kVolume);
+  for (std::size_t i = 1; i < sources.size(); ++i)
+    window->values.insert(window->values.end(), sources[i], sources[i] + kVolume);
+  window->ranges.resize(sources.size(), Interval::of(0));
+  fillBorders(*window);
+  return window;
+}
+
+/// Appends chosen bricks of a packed grid to a packed grid.
+void append(BrickGrid& grid, const BrickGrid& part, const std::vector<bool>& chosen) {
+  constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
+  const auto count = std::size_t(std::count(chosen.begin(), chosen.end(), true));
+  detail::resizeLarge(grid.codes, (grid.poolSize() + count) * kVolume);
+  for (const PlacedBrick& brick : placedBricks(part)) {
+    const auto pool = std::size_t(brick.pool);
+    if (!chosen[pool]) continue;
+    grid.table[grid.tableIndex(brick.brick)] = std::int32_t(grid.poolSize());
+    std::copy_n(part.codes.data() + pool * kVolume, kVolume, grid.codes.data() + grid.poolSize() * kVolume);
+    grid.ranges.push_back(part.ranges[pool]);
+  }
+}
+
+/// Work that is a part of a stage: from one share of it to another.
+class ShareOfProgress final : public Progress {
  public:
-  explicit Joined(const Box& box, float voxelSize) {
-    grid_ = std::make_shared<BrickGrid>();
-    grid_->voxelSize = voxelSize;
-    grid_->indexToWorld.linear = Mat3f::scaling(voxelSize);
-    grid_->worldToIndex.linear = Mat3f::scaling(1.0f / voxelSize);
-    for (int axis = 0; axis < 3; ++axis) {
-      grid_->firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-      grid_->brickCount[axis] =
-          int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - grid_->firstBrick[axis];
-    }
-    const Vec3i n = grid_->brickCount;
-    grid_->table.resize(std::size_t(n.x) * n.y * n.z);
-    grid_->codes.resize(kVolume);
-    grid_->ranges.push_back(Interval::of(0));
-  }
+  ShareOfProgress(const Progress& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
 
-  void add(const BrickGrid& part, const std::vector<bool>& chosen) {
-    const auto count = std::size_t(std::count(chosen.begin(), chosen.end(), true));
-    detail::resizeLarge(grid_->codes, (grid_->poolSize() + count) * kVolume);
-    for (const PlacedBrick& brick : placedBricks(part)) {
-      const auto pool = std::size_t(brick.pool);
-      if (!chosen[pool]) continue;
-      grid_->table[grid_->tableIndex(brick.brick)] = std::int32_t(grid_->poolSize());
-      std::copy_n(part.codes.data() + pool * kVolume, kVolume,
-                  grid_->codes.data() + grid_->poolSize() * kVolume);
-      grid_->ranges.push_back(part.ranges[pool]);
-    }
-  }
-
-  std::shared_ptr<BrickGrid> grid() const { return grid_; }
+  void advance(double fraction) const override { whole_.advance(from_ + (to_ - from_) * fraction); }
+  void note(std::string_view message) const override { whole_.note(message); }
+  bool cancelled() const override { return whole_.cancelled(); }
 
  private:
-  static constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
-
-  std::shared_ptr<BrickGrid> grid_;
+  const Progress& whole_;
+  double from_, to_;
 };
 
 class LayerSampler {
@@ -173,34 +313,53 @@ class LayerSampler {
 
  private:
   /// The layer's grid, packed. Made in parts along z, since samples take twice the memory until they are
-  /// packed. A part sees as much of its neighbours as can reach it through the smoothing: the parts do not
+  /// packed. A part is smoothed together with as much of its neighbours as can reach it: the parts do not
   /// show.
   std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
     const Box box = options_.box.expanded(reach_ + step.margin);
-    const MedialSmoothingOptions smoothing{.jump = kLargestSlope * step.bound * step.layer->frequency * voxel,
-                                           .dilation = dilation(voxel)};
-    const float thickness = float(kPartBricks * BrickGrid::kBrick) * voxel;
-    const float halo = float(smoothing.dilation + smoothing.steps + 1 + BrickGrid::kAfter) * voxel;
-    const int first = int(std::floor(box.min.z / thickness)), last = int(std::floor(box.max.z / thickness));
-    Joined joined(box, voxel);
-    Count count;
-    for (int part = first; part <= last; ++part) {
-      const Box around{{box.min.x, box.min.y, float(part) * thickness - halo},
-                       {box.max.x, box.max.y, float(part + 1) * thickness + halo}};
+    const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
+    const Parts cut = partsOf(box, voxel, smoothing.dilation + smoothing.steps);
+    std::shared_ptr<BrickGrid> layer = emptyGrid(box, voxel, cut.all);
+    layer->codes.resize(BrickGrid::kVolume);
+    const ScalarField needed =
+        NeededNode::isOfUse(step, layers_)
+            ? ScalarField(std::make_shared<NeededNode>(step, layers_, options_.voxelSize))
+            : step.displacement;
+    const int count = cut.count();
+    std::deque<Part> parts;
+    const auto bakePart = [&](int part) {
+      const ShareOfProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
+      parts.push_back({cut[part], bakeSlab(needed, cut[part], box, voxel, share)});
+    };
+    Count total;
+    bakePart(0);
+    for (int part = 0; part < count; ++part) {
+      if (part + 1 < count) bakePart(part + 1);
+      const auto window = windowOf(parts, cut.around(part), box, voxel);
+      // The next window needs the end of this part and all of the next one.
+      while (parts.size() > (part + 1 < count ? 2 : 0)) parts.pop_front();
       detail::releaseFreed();
-      const auto baked = bakeGrid(
-          step.displacement,
-          {.voxelSize = voxel, .box = box.intersection(around), .interpolation = Interpolation::tricubic},
-          progress_);
-      if (step.bound > 0) smoothMedialJumps(*baked, smoothing, progress_);
-      const Slab slab{part == first ? std::numeric_limits<int>::min() : part * kPartBricks,
-                      part == last ? std::numeric_limits<int>::max() : (part + 1) * kPartBricks};
-      const std::vector<bool> matters = judged(step, *baked, slab, count);
-      pack(*baked);
-      joined.add(*baked, matters);
+      const double done = kShareOfBake * std::min(part + 2, count) / count;
+      if (step.bound > 0) smoothMedialJumps(*window, smoothing, ShareOfProgress(progress_, done, done));
+      const std::vector<bool> matters = judged(step, *window, cut[part], total);
+      pack(*window);
+      append(*layer, *window, matters);
     }
-    report(step, count, voxel);
-    return joined.grid();
+    report(step, total, voxel);
+    return layer;
+  }
+
+  /// The samples of the bricks of a slab.
+  std::shared_ptr<BrickGrid> bakeSlab(const ScalarField& displacement, const Slab& slab, const Box& box,
+                                      float voxel, const Progress& progress) const {
+    // All that interpolation in the slab's bricks reads, so that bricks are kept or dropped as in one piece.
+    const float first = float(slab.begin * BrickGrid::kBrick - BrickGrid::kBefore) + 0.5f;
+    const float last = float(slab.end * BrickGrid::kBrick - 1 + BrickGrid::kAfter) - 0.5f;
+    const Box around{{box.min.x, box.min.y, first * voxel}, {box.max.x, box.max.y, last * voxel}};
+    const Box inside = box.intersection(around);
+    if (inside.isEmpty()) return emptyGrid(box, voxel, slab);
+    return bakeGrid(displacement,
+                    {.voxelSize = voxel, .box = inside, .interpolation = Interpolation::tricubic}, progress);
   }
 
   int dilation(float voxel) const {
@@ -234,7 +393,7 @@ class LayerSampler {
     }
     // At the grid's own voxels trilinear interpolation gives the samples.
     level_ = bakeGrid(ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))),
-                      spec, progress_);
+                      spec, ShareOfProgress(progress_, kShareOfBake, 1));
     pack(*level_);
     sampled.level = gridField(level_);
     sampled.surface = gridField(level_, Interpolation::tricubic);
@@ -283,9 +442,8 @@ class LayerSampler {
   std::vector<bool> judged(const CumuloStep& step, const BrickGrid& grid, const Slab& slab,
                            Count& total) const {
     std::vector<PlacedBrick> bricks = placedBricks(grid);
-    std::erase_if(bricks,
-                  [&](const PlacedBrick& b) { return b.brick.z < slab.begin || b.brick.z >= slab.end; });
-    const std::size_t stride = std::max<std::size_t>(1, bricks.size() / kSearchedBricks);
+    std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
+    const std::size_t stride = std::max(kLeastStride, bricks.size() / kSearchedBricks);
     const VectorField foot =
         surfacePoint(step.surface, {.steps = options_.newtonSteps, .voxel = options_.voxelSize});
     const float least = step.bound - step.reach - step.margin;
@@ -351,7 +509,7 @@ class LayerSampler {
 }  // namespace
 
 float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index, float resultVoxelSize) {
-  const float wave = 1 / layers[index].frequency;
+  const float wave = 1 / (layers[index].frequency * layers[index].detail);
   const float aimed = wave / (index + 1 < layers.size() ? kSamplesPerWave : kSamplesPerLastWave);
   return std::min(wave / kFewestSamplesPerWave, std::max(aimed, resultVoxelSize));
 }
@@ -365,15 +523,35 @@ float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize
   return std::max(6 * voxel, edge * 4 / 3 + 3 * voxel);
 }
 
-double estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float voxelSize, double area) {
-  // A grid holds bricks over the band's width plus one brick, four bytes per sample with its border.
-  constexpr double kBytesPerVoxel = sizeof(float) * double(BrickGrid::kVolume) / (8 * 8 * 8);
-  double bytes = 0;
+CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float voxelSize, double area,
+                                 const Box& box) {
+  // Measured. Displaced surfaces are larger than their base, of which the outside of a band is larger still;
+  // bricks that no later layer can bring to the surface are dropped, and sums need no bricks far inside.
+  constexpr double kGrowth = 1.8, kKept = 0.68, kSum = 0.78;
+  constexpr double kPacked = sizeof(std::uint16_t) * double(BrickGrid::kVolume);
+  constexpr double kUnpacked = sizeof(float) * double(BrickGrid::kVolume);
+  // What bakes and smoothing hold beside the samples.
+  constexpr double kWork = 1.2;
+  CumuloBytes bytes;
+  double sum = 0;
   for (std::size_t i = 0; i < layers.size(); ++i) {
-    const double voxel = cumuloVoxelSize(layers, i, voxelSize);
+    const float voxel = cumuloVoxelSize(layers, i, voxelSize);
+    const float reach = displacementBound(layers, i), margin = kMarginVoxels * voxel;
+    // The band, and bricks that it only touches.
     const double width =
-        displacementBound(layers, i) + (2 * double(kMarginVoxels) + BrickGrid::kBrick) * voxel;
-    bytes += 2 * kBytesPerVoxel * area * width / (voxel * voxel * voxel);
+        double(reach) + (1 + double(detail::kOuterShare)) * margin + double(BrickGrid::kBrick) * voxel;
+    const double bricks = kGrowth * area * width / std::pow(double(BrickGrid::kBrick) * voxel, 3);
+    const Parts cut = partsOf(box.expanded(displacementBound(layers) + margin), voxel,
+                              kLeastDilation + MedialSmoothingOptions{}.steps);
+    // Of a layer in parts: three, of which one has neighbours around it.
+    const double share =
+        std::min(1.0, (3.0 * cut.thickness + 3.0 * cut.halo) / double(cut.all.end - cut.all.begin));
+    const double packed = cut.count() > 1 ? kKept * bricks * kPacked : 0.0;
+    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * share * bricks * kUnpacked + packed);
+    bytes.kept += kKept * bricks * kPacked;
+    if (i + 1 == layers.size()) break;
+    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * kSum * bricks * kUnpacked);
+    sum = kSum * bricks * kPacked;
   }
   return bytes;
 }

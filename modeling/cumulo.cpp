@@ -13,22 +13,20 @@
 // not.
 #include "modeling/cumulo.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
 #include <string>
 
 #include "modeling/error.h"
 #include "modeling/field_ops.h"
-#include "modeling/noise.h"
 #include "modeling/surface_point.h"
 
 namespace nephele {
 
 namespace {
 
-/// A layer's band needs less beyond its reach than inside, where the next sums still rise: 3 voxels to 4.
-constexpr float kOuterShare = 0.75f;
+using detail::kOuterShare;
 
 /// What the valleys of a layer are cleared by: the displacement of the layer before, and its amplitude.
 struct Before {
@@ -44,10 +42,12 @@ class LayerNode final : public FieldNode<float> {
         noise_(step.layer->noise.node()),
         amplitude_(step.layer->amplitude.node()),
         billow_(step.layer->billow.node()),
+        billowScale_(step.layer->billowScale.node()),
         before_(before),
-        billowScale_(step.layer->billowScale),
         band_{-step.reach - kOuterShare * step.margin, step.margin},
-        bound_(step.bound) {
+        bound_(step.bound),
+        noiseBound_(step.layer->noise.range(Box::everywhere()).magnitude()),
+        amplitudeVaries_(!step.layer->amplitude.range(Box::everywhere()).isPoint()) {
     projection_.steps = options.newtonSteps;
     projection_.voxel = options.voxelSize;
     if (step.index == 0) projection_.fallback = options.closestPoint;
@@ -80,7 +80,10 @@ class LayerNode final : public FieldNode<float> {
     float* noise = frame.lane();
     float* amplitude = frame.lane();
     noise_->eval(surfacePoints, {noise}, scratch);
-    amplitude_->eval(surfacePoints, {amplitude}, scratch);
+    if (amplitudeVaries_)
+      evalAmplitude(start, end, level, origin, surfacePoints, amplitude, scratch);
+    else
+      amplitude_->eval(surfacePoints, {amplitude}, scratch);
     for (int i = 0; i < count; ++i) noise[i] *= amplitude[i];
     if (before_.displacement) clearValleys(surfacePoints, noise, scratch);
     for (int i = 0; i < count; ++i) values[0][origin[i]] = noise[i];
@@ -89,95 +92,69 @@ class LayerNode final : public FieldNode<float> {
   Interval range(const Box& box) const override {
     const Interval level = level_->range(box);
     if (level.max < band_.min || level.min > band_.max) return Interval::of(0);
-    return {-bound_, bound_};
+    if (!amplitudeVaries_) return {-bound_, bound_};
+    const float deepest = std::max(-std::max(level.min, band_.min), std::min(level.max, band_.max));
+    const float most = amplitude_->range(box.expanded(farthest(deepest))).max * noiseBound_;
+    return most > 0 ? Interval{-std::min(most, bound_), std::min(most, bound_)} : Interval::of(0);
   }
 
   float differenceStep() const override { return *projection_.voxel; }
 
  private:
+  /// Amplitudes are read no farther than this from a point at which the level is `level`. The surface is
+  /// nearer but for places where Newton steps lose their way.
+  float farthest(float level) const { return detail::farthestSurfacePoint(level, *projection_.voxel); }
+
+  /// The amplitude at the surface points `end` of `start`. What lies beyond `farthest` is read on the way
+  /// there, so that the range of a box follows from amplitudes near it.
+  void evalAmplitude(const BlockLanes<3>& start, const BlockLanes<3>& end, const float* level,
+                     const std::array<std::uint8_t, kBlockSize>& origin, const PointBlock& surfacePoints,
+                     float* amplitude, Scratch& scratch) const {
+    Scratch::Frame frame(scratch);
+    const BlockLanes<3> nearer = frame.lanes<3>();
+    bool isFar = false;
+    for (int i = 0; i < surfacePoints.count; ++i) {
+      const Vec3f from{start[0][i], start[1][i], start[2][i]}, to{end[0][i], end[1][i], end[2][i]};
+      const float most = 0.999f * farthest(std::abs(level[origin[i]])), far = length(to - from);
+      const Vec3f at = far > most ? from + (to - from) * (most / far) : to;
+      isFar |= far > most;
+      for (int a = 0; a < 3; ++a) nearer[a][i] = at[a];
+    }
+    amplitude_->eval(isFar ? scratch.pointBlock(nearer, surfacePoints.count) : surfacePoints, {amplitude},
+                     scratch);
+  }
+
   void clearValleys(const PointBlock& points, float* noise, Scratch& scratch) const {
     Scratch::Frame frame(scratch);
     float* height = frame.lane();
     float* full = frame.lane();
     float* billow = frame.lane();
+    float* scale = frame.lane();
     billow_->eval(points, {billow}, scratch);
+    billowScale_->eval(points, {scale}, scratch);
     before_.displacement->eval(points, {height}, scratch);
     before_.amplitude->eval(points, {full}, scratch);
     for (int i = 0; i < points.count; ++i) {
       // pow(0, 0) is 1 by the C standard, as the formula asks; a layer of amplitude 0 counts as valley
       // everywhere.
-      const float h = std::abs(height[i]), q = billowScale_ * full[i];
+      const float h = std::abs(height[i]), q = scale[i] * full[i];
       const float share = h >= q ? (h > 0 ? 1.0f : 0.0f) : h / q;
       if (billow[i] == 1)
         noise[i] *= share;
       else
-        noise[i] *= std::pow(share, billow[i]);
+        noise[i] *= std::pow(share, std::max(billow[i], 0.0f));
     }
   }
 
-  NodePtr<float> surface_, level_, noise_, amplitude_, billow_;
+  NodePtr<float> surface_, level_, noise_, amplitude_, billow_, billowScale_;
   Before before_;
-  float billowScale_;
   Interval band_;
-  float bound_;
+  float bound_, noiseBound_;
+  bool amplitudeVaries_;
   SurfacePointOptions projection_;
 };
 
-float largest(const ScalarField& field, const char* what, std::size_t layer) {
-  const float bound = field.range(Box::everywhere()).magnitude();
-  require(std::isfinite(bound), "cumulo: the " + std::string(what) + " of layer " +
-                                    std::to_string(layer + 1) + " has no finite range");
-  return bound;
-}
-
-float layerBound(const CumuloLayer& layer, std::size_t index) {
-  return largest(layer.amplitude, "amplitude", index) * largest(layer.noise, "noise", index);
-}
-
-void check(const CumuloLayer& layer, std::size_t index) {
-  static_cast<void>(layerBound(layer, index));
-  const std::string name = "cumulo: layer " + std::to_string(index + 1) + ": ";
-  require(layer.billowScale > 0 && std::isfinite(layer.billowScale),
-          name + "billowScale must be > 0, got " + std::to_string(layer.billowScale));
-  require(layer.frequency > 0 && std::isfinite(layer.frequency),
-          name + "frequency must be > 0, got " + std::to_string(layer.frequency));
-  const float amplitude = layer.amplitude.range(Box::everywhere()).min;
-  require(amplitude >= 0, name + "amplitude must be >= 0, got " + std::to_string(amplitude));
-  const float billow = layer.billow.range(Box::everywhere()).min;
-  require(billow >= 0, name + "billow must be >= 0, got " + std::to_string(billow));
-}
-
 }  // namespace
-
-std::vector<CumuloLayer> cumuloLayers(const CumuloFractal& fractal) {
-  require(fractal.layers >= 1 && fractal.layers <= kMaxCumuloLayers,
-          "cumuloLayers: layers must be 1 to " + std::to_string(kMaxCumuloLayers) + ", got " +
-              std::to_string(fractal.layers));
-  require(fractal.frequency > 0 && std::isfinite(fractal.frequency),
-          "cumuloLayers: frequency must be > 0, got " + std::to_string(fractal.frequency));
-  require(fractal.lacunarity > 0 && std::isfinite(fractal.lacunarity),
-          "cumuloLayers: lacunarity must be > 0, got " + std::to_string(fractal.lacunarity));
-  std::vector<CumuloLayer> layers;
-  CumuloLayer layer{.amplitude = fractal.amplitude,
-                    .billow = fractal.billow,
-                    .billowScale = fractal.billowScale,
-                    .frequency = fractal.frequency};
-  std::mt19937 seeds(fractal.seed);
-  for (int i = 0; i < fractal.layers; ++i) {
-    layer.noise = perlin({.frequency = layer.frequency, .seed = static_cast<std::uint32_t>(seeds())});
-    check(layer, std::size_t(i));
-    layers.push_back(layer);
-    layer.amplitude = layer.amplitude * fractal.roughness;
-    layer.frequency *= fractal.lacunarity;
-  }
-  return layers;
-}
-
-float displacementBound(const std::vector<CumuloLayer>& layers, std::size_t first) {
-  float sum = 0;
-  for (std::size_t i = first; i < layers.size(); ++i) sum += layerBound(layers[i], i);
-  return sum;
-}
 
 ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
                    const CumuloOptions& options) {
@@ -185,7 +162,7 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
           "cumulo: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(options.newtonSteps >= 1 && options.newtonSteps <= 64,
           "cumulo: newtonSteps must be 1 to 64, got " + std::to_string(options.newtonSteps));
-  for (std::size_t i = 0; i < layers.size(); ++i) check(layers[i], i);
+  detail::requireSane(layers);
 
   ScalarField sum = memo(base), surface = sum, level = sum;
   Before before;
@@ -198,7 +175,7 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
     step.before = sum;
     step.surface = surface;
     step.level = level;
-    step.bound = layerBound(layer, i);
+    step.bound = detail::layerBound(layers, i);
     step.reach = displacementBound(layers, i);
     step.margin = options.margin ? options.margin(i) : 4 * options.voxelSize;
     step.displacement = ScalarField(std::make_shared<LayerNode>(step, before, options));

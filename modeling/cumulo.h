@@ -1,11 +1,10 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
 
-#include "modeling/field.h"
+#include "modeling/cumulo_layers.h"
 
 /// cumulo: layers of pyroclastic displacement, small bumps on large ones, with smooth valleys between them.
 ///
@@ -19,45 +18,6 @@
 /// Positive inside; d_i >= 0, so what is inside stays inside. Source: Tessendorf, Resolution Independent
 /// Volumes, equations 3.3 - 3.8.
 namespace nephele {
-
-/// One layer of displacement.
-struct CumuloLayer {
-  /// Already in its frequency, unit rms, with a finite range. Its absolute value displaces.
-  ScalarField noise{0.0f};
-  /// Rms of the displacement, world units, >= 0.
-  ScalarField amplitude{0.0f};
-  /// Exponent of the clearing of valleys, >= 0; 0 clears nothing. Without effect in the first layer.
-  ScalarField billow{0.0f};
-  /// The layer is full where the layer before displaces by at least this many of its amplitudes; > 0.
-  float billowScale = 1.0f;
-  /// Highest frequency of `noise`, cycles per world unit, > 0. Tells a bake how finely to sample.
-  float frequency = 1.0f;
-};
-
-/// Layers in fractal form: amplitude a_i = amplitude roughness^i, frequency f_i = frequency lacunarity^i.
-struct CumuloFractal {
-  int layers = 4;
-  ScalarField amplitude{0.025f};  ///< World units, rms, of the first layer.
-  float frequency = 4.4f;         ///< Cycles per world unit of the first layer.
-  float lacunarity = 2.1f;
-  ScalarField roughness{0.55f};
-  ScalarField billow{1.0f};
-  float billowScale = 1.0f;
-  std::uint32_t seed = 0;
-};
-
-inline constexpr int kMaxCumuloLayers = 16;
-
-/// Perlin layers for `cumulo`. Each layer's noise has its own seed, turn and offset: Perlin noise is 0 on its
-/// integer lattice, and layers that shared those zeros would all be still at the same places.
-/// @throws Error if layers is outside 1 .. kMaxCumuloLayers, if frequency, lacunarity or billowScale is not >
-/// 0, or if amplitude, roughness or billow can be negative.
-std::vector<CumuloLayer> cumuloLayers(const CumuloFractal& fractal);
-
-/// Largest displacement that `layers[first]` and those after it can add, world units: the sum of amplitude
-/// times bound of the noise. The band in which the base must be a distance follows from it.
-/// @throws Error if an amplitude or a noise has no finite range.
-float displacementBound(const std::vector<CumuloLayer>& layers, std::size_t first = 0);
 
 /// One layer, ready to be evaluated, as the bake hook sees it.
 struct CumuloStep {
@@ -112,4 +72,17 @@ struct CumuloOptions {
 ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
                    const CumuloOptions& options);
 
+namespace detail {
+
+/// A layer's band needs less of its margin beyond its reach than inside, where the next sums still rise: 3
+/// voxels to 4.
+inline constexpr float kOuterShare = 0.75f;
+
+/// How far from a point whose level is `level` from 0 a layer reads its amplitude at most, world units.
+/// Levels rise at least as fast as distances, but where they were sampled.
+inline float farthestSurfacePoint(float level, float voxel) {
+  return 1.25f * level + 4 * voxel;
+}
+
+}  // namespace detail
 }  // namespace nephele

@@ -224,7 +224,6 @@ TEST(CloudVerb, BadOptionsAreUsageErrorsThatNameThem) {
                                 "--frequency 0x",
                                 "--billow -0.5",
                                 "--billow nan",
-                                "--noise simplex",
                                 "--renormalise maybe",
                                 "--medial-smoothing 17",
                                 "--edge-thickness 0",

@@ -6,6 +6,8 @@
 #include "levelset/cloud_density.h"
 #include "levelset/cumulo_grids.h"
 #include "levelset/grid_field.h"
+#include "modeling/density_profile.h"
+#include "modeling/field_ops.h"
 #include "modeling/shapes.h"
 
 namespace nephele {
@@ -43,6 +45,54 @@ void oneLayer(benchmark::State& state) {
   state.counters["voxels"] = double(voxels);
 }
 BENCHMARK(oneLayer)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
+
+std::uint64_t activeVoxels(const GriddedCumulo& cloud) {
+  std::uint64_t voxels = 0;
+  for (const CumuloLayerReport& layer : cloud.layers) voxels += layer.activeVoxels;
+  return voxels;
+}
+
+/// Three layers whose waves are as many voxels long at every resolution: items are active voxels of all
+/// layers, and cost should follow them.
+void layersOfResolution(benchmark::State& state) {
+  const float scale = float(state.range(0)) / 512;
+  const auto layers = cumuloLayers(
+      {.layers = 3, .amplitude = 0.025f * kLongestSide / scale, .frequency = 6 * scale / kLongestSide});
+  const float voxel = kLongestSide / float(state.range(0));
+  const ScalarField base = sampledTorus(voxel, layers);
+  std::uint64_t voxels = 0;
+  for (auto _ : state)
+    voxels = activeVoxels(griddedCumulo(base, layers, {.voxelSize = voxel, .box = kTorusBox}));
+  state.SetItemsProcessed(std::int64_t(voxels) * state.iterations());
+  state.counters["voxels"] = double(voxels);
+}
+BENCHMARK(layersOfResolution)->Arg(512)->Arg(1024)->Arg(2048)->Unit(benchmark::kMillisecond);
+
+/// What parameters that vary cost: three layers at resolution 512 whose parameters are constants (0), ramps
+/// along x (1), or a sampled mask (2), with the same largest values.
+void varyingParameters(benchmark::State& state) {
+  CumuloFractal fractal{.layers = 3, .amplitude = 0.025f * kLongestSide, .frequency = 6 / kLongestSide};
+  ScalarField across = ramp(plane({}, {1, 0, 0}), {{-kLongestSide / 2, 0}, {kLongestSide / 2, 1}});
+  const float voxel = kLongestSide / 512;
+  if (state.range(0) == 2)
+    across = bake(across, {.voxelSize = 4 * voxel, .box = kTorusBox.expanded(kLongestSide / 4)});
+  if (state.range(0) > 0) {
+    const ScalarField share = 0.5f + 0.5f * across;
+    fractal.amplitude = fractal.amplitude * share;
+    fractal.roughness = fractal.roughness * share;
+    fractal.billow = fractal.billow * share;
+    fractal.billowScale = fractal.billowScale * share;
+  }
+  if (state.range(0) == 1) fractal.frequency = fractal.frequency * (0.5f + 0.5f * across);
+  const auto layers = cumuloLayers(fractal);
+  const ScalarField base = sampledTorus(voxel, layers);
+  std::uint64_t voxels = 0;
+  for (auto _ : state)
+    voxels = activeVoxels(griddedCumulo(base, layers, {.voxelSize = voxel, .box = kTorusBox}));
+  state.SetItemsProcessed(std::int64_t(voxels) * state.iterations());
+  state.SetLabel(state.range(0) == 0 ? "constants" : state.range(0) == 1 ? "ramps" : "mask");
+}
+BENCHMARK(varyingParameters)->Arg(0)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond);
 
 /// A cloud of three layers with its density: items are active voxels of the density.
 void cloudOfResolution(benchmark::State& state) {

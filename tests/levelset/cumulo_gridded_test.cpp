@@ -255,6 +255,24 @@ TEST(CumuloGrids, IsTheSameAtAnyThreadCount) {
   }
 }
 
+TEST(CumuloGrids, PartsThatLayersAreMadeInDoNotShow) {
+  // Two spheres one above the other along z: displacement jumps between them, and is smoothed there.
+  const ScalarField base = unionOf(sphere({0, 0, -0.56f}, 0.5f), sphere({0, 0, 0.56f}, 0.5f));
+  const auto layers = layersOfSlope(0.5f, 6, 2);
+  const float voxel = 0.02f;
+  const auto cloudIn = [&](const Box& box) {
+    return griddedCumulo(base, layers, {.voxelSize = voxel, .box = box});
+  };
+  // Both larger than need be, so that no brick of the cloud lies at the edge. In the second, the second layer
+  // has more positions than are baked in one piece: its parts are some 0.9 thick along z.
+  const GriddedCumulo whole = cloudIn({{-2.5f, -2.5f, -2.5f}, {2.5f, 2.5f, 2.5f}});
+  const GriddedCumulo parts = cloudIn({{-6, -6, -6}, {6, 6, 6}});
+  EXPECT_EQ(parts.layers[1].activeVoxels, whole.layers[1].activeVoxels);
+  const Points points = voxelsInBand(whole.surface, {-3 * voxel, 2 * voxel},
+                                     {{-0.8f, -0.8f, -1.3f}, {0.8f, 0.8f, 1.3f}}, 0.01f, 20000);
+  EXPECT_EQ(valuesAt(parts.surface, points), valuesAt(whole.surface, points));
+}
+
 TEST(CumuloGrids, RenormalisingKeepsTheSurfaceOfOneLayer) {
   // After the last layer nothing is renormalised, and one layer has no other.
   using Renormalise = CumuloGridOptions::Renormalise;
