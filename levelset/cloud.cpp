@@ -32,9 +32,12 @@ Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
   return mesh;
 }
 
-/// Where the last layer is coarser than the result, a base as coarse holds what that layer can follow.
+/// Where the last layer is coarser than the result, so may the base be; its own detail shows between the
+/// bumps, so not by much.
 float baseVoxelSize(const std::vector<CumuloLayer>& layers, float voxelSize) {
-  return std::max(voxelSize, cumuloVoxelSize(layers, layers.size() - 1, voxelSize));
+  constexpr float kMostVoxels = 2;
+  return std::clamp(cumuloVoxelSize(layers, layers.size() - 1, voxelSize), voxelSize,
+                    kMostVoxels * voxelSize);
 }
 
 /// The share of the box, in level slices, in which `factor` is not one number, so that voxels are stored.
