@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include "levelset/grid_field.h"
+#include "levelset/mesh_pieces.h"
 #include "levelset/mesh_to_level_set.h"
 #include "levelset/pieces.h"
 #include "tests/support/test_meshes.h"
@@ -55,10 +56,28 @@ void cells(benchmark::State& state) {
   cut(state, all);
 }
 
+void exactCut(benchmark::State& state, const MeshCutOptions& options) {
+  MeshPieces pieces;
+  for (auto _ : state) pieces = cutMesh(torus(), options);
+  state.SetItemsProcessed(state.iterations() * std::int64_t(pieces.pieces.size()));
+  state.SetLabel(std::to_string(pieces.pieces.size()) + " pieces");
+}
+
+void exactPlanes(benchmark::State& state) {
+  exactCut(state,
+           {.planes = randomBlades({.count = int(state.range(0)), .box = boundingBox(torus()), .seed = 1})});
+}
+
+void exactCells(benchmark::State& state) {
+  exactCut(state, {.cells = scatteredPoints(ScalarField(1), boundingBox(torus()), int(state.range(0)), 1)});
+}
+
 BENCHMARK(levelSet)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(planes)->Arg(1)->Arg(5)->Arg(20)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(roughPlanes)->Arg(5)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(cells)->Arg(12)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(exactPlanes)->Arg(1)->Arg(5)->Arg(20)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(exactCells)->Arg(12)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace nephele

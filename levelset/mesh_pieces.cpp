@@ -1,0 +1,307 @@
+// Cutting closed meshes into closed pieces.
+//
+// Planes split all parts that there are, one plane after another, so that cost follows the pieces. A Voronoi
+// cell is what the bisectors with its neighbours leave of the solid, nearest first; once the next point is
+// more than twice as far as anything that is left, no other can reach the cell (radius of security: Levy and
+// Bonneel, "Variational Anisotropic Surface Meshing with Voronoi Parallel Linear Enumeration", 2012).
+// Contacts are found by their triangles, which are the same on both sides. Everything is ordered by cell,
+// code and place in the source, never by thread.
+#include "levelset/mesh_pieces.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <memory>
+
+#include "levelset/cut_source.h"
+#include "modeling/error.h"
+#include "modeling/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+using detail::CutPlane;
+using detail::CutSource;
+using detail::Solid;
+using detail::SolidSplitter;
+
+struct Part {
+  Solid solid;
+  PieceCode code;
+};
+
+/// Parts that share their cut points.
+struct Family {
+  std::unique_ptr<SolidSplitter> splitter;
+  std::vector<Part> parts;
+};
+
+struct InnerTriangle {
+  std::uint64_t place;
+  std::uint32_t piece;
+  double area;
+};
+
+std::vector<CutPlane> cutPlanes(const std::vector<BladePlane>& blades) {
+  std::vector<CutPlane> planes;
+  for (const BladePlane& blade : blades) {
+    const Vec3d normal(blade.normal), point(blade.point);
+    const double size = length(normal);
+    require(isFinite(point) && isFinite(normal) && size > 0,
+            fmt::format("cut: plane {} must have a finite point and a normal that is not 0", planes.size()));
+    planes.push_back({normal / size, dot(normal, point) / size});
+  }
+  return planes;
+}
+
+std::vector<Vec3d> cellPoints(const std::vector<Vec3f>& cells) {
+  std::vector<Vec3d> points;
+  for (const Vec3f& p : cells) {
+    require(isFinite(p), fmt::format("cut: the point of cell {} is not finite", points.size()));
+    points.emplace_back(p);
+  }
+  const auto same = firstEqualPosition(points);
+  for (std::size_t i = 0; i < same.size(); ++i)
+    require(same[i] == i, fmt::format("cut: cells {} and {} have the same point", same[i], i));
+  return points;
+}
+
+/// What is left of the solid in a cell.
+Solid cellOf(SolidSplitter& splitter, std::span<const Vec3d> cells, std::uint32_t index) {
+  const Vec3d& centre = cells[index];
+  const auto squared = [&](std::uint32_t j) { return dot(cells[j] - centre, cells[j] - centre); };
+  const auto isFarther = [&](std::uint32_t a, std::uint32_t b) {
+    return squared(a) != squared(b) ? squared(a) > squared(b) : a > b;
+  };
+  std::vector<std::uint32_t> others;
+  for (std::uint32_t j = 0; j < cells.size(); ++j)
+    if (j != index) others.push_back(j);
+  std::make_heap(others.begin(), others.end(), isFarther);
+  Solid solid = splitter.source();
+  while (!others.empty() && !solid.isEmpty()) {
+    std::pop_heap(others.begin(), others.end(), isFarther);
+    const std::uint32_t other = others.back();
+    others.pop_back();
+    const double reach = length(max(solid.high - centre, centre - solid.low));
+    if (std::sqrt(squared(other)) > 2.000001 * reach) break;
+    const std::uint32_t low = std::min(index, other), high = std::max(index, other);
+    const CutPlane plane = detail::bisector(cells, low, high);
+    const int side = index == low ? 0 : 1;
+    if (splitter.sideOfBox(solid, plane) == (side == 0 ? -1 : 1)) continue;
+    splitter.begin(plane);
+    solid = std::move(splitter.split(solid, {side == 0, side == 1})[std::size_t(side)]);
+  }
+  return solid;
+}
+
+void splitByPlanes(Family& family, const std::vector<CutPlane>& planes, const Progress& progress) {
+  for (const CutPlane& plane : planes) {
+    progress.check();
+    family.splitter->begin(plane);
+    std::vector<Part> next;
+    for (Part& part : family.parts) {
+      const int side = family.splitter->sideOfBox(part.solid, plane);
+      if (side != 0) {
+        part.code.sides.push_back(side > 0);
+        next.push_back(std::move(part));
+        continue;
+      }
+      auto halves = family.splitter->split(part.solid);
+      for (const std::size_t k : {0, 1}) {
+        if (halves[k].isEmpty()) continue;
+        next.push_back({std::move(halves[k]), part.code});
+        next.back().code.sides.push_back(k == 1);
+      }
+    }
+    family.parts = std::move(next);
+  }
+}
+
+/// Cells whose points are arranged so that more than four meet find the place of that by different ways:
+/// gives all cut points within `tolerance` of each other the same bits.
+void alignCutPoints(std::vector<Family>& families, double tolerance) {
+  // A direction, no longer than 1, across which no model has many points.
+  constexpr Vec3d kAcross{0.8417, 0.4273, 0.3291};
+  struct CutPoint {
+    double key;
+    Vec3d place;
+    std::uint32_t family, vertex;
+  };
+  std::vector<CutPoint> points;
+  for (std::uint32_t i = 0; i < families.size(); ++i) {
+    const std::uint32_t first = families[i].splitter->firstCutPoint();
+    std::vector<std::uint32_t> used;
+    for (const Part& part : families[i].parts)
+      for (const detail::SolidEdge& edge : part.solid.edges)
+        if (edge.from >= first) used.push_back(edge.from);
+    std::sort(used.begin(), used.end());
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    for (const std::uint32_t v : used) {
+      const Vec3d& p = families[i].splitter->position(v);
+      points.push_back({dot(p, kAcross), p, i, v});
+    }
+  }
+  std::sort(points.begin(), points.end(), [](const CutPoint& a, const CutPoint& b) {
+    return a.key != b.key ? a.key < b.key : std::pair(a.family, a.vertex) < std::pair(b.family, b.vertex);
+  });
+  std::vector<bool> isDone(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (isDone[i]) continue;
+    for (std::size_t j = i + 1; j < points.size() && points[j].key - points[i].key <= tolerance; ++j) {
+      if (isDone[j] || length(points[j].place - points[i].place) > tolerance) continue;
+      isDone[j] = true;
+      families[points[j].family].splitter->move(points[j].vertex, points[i].place);
+    }
+  }
+}
+
+std::uint64_t mixed(std::uint64_t h) {
+  h ^= h >> 32;
+  h *= 0x9e3779b97f4a7c15u;
+  return h ^ h >> 29;
+}
+
+/// The same for triangles with the same three places, in any order.
+std::uint64_t placeOf(std::array<Vec3d, 3> corners) {
+  std::sort(corners.begin(), corners.end());
+  std::uint64_t h = 1;
+  for (const Vec3d& p : corners)
+    for (const double x : {p.x, p.y, p.z}) {
+      std::uint64_t bits;
+      const double positive = x + 0.0;
+      std::memcpy(&bits, &positive, sizeof bits);
+      h = mixed(h + bits);
+    }
+  return h;
+}
+
+struct Assembly {
+  std::vector<MeshPiece> pieces;
+  std::vector<std::vector<InnerTriangle>> inner;
+  std::size_t slivers = 0;
+  double sliverVolume = 0.0;
+};
+
+Assembly assemble(const CutSource& source, const SolidSplitter& splitter, Part& part, double minVolume) {
+  Assembly result;
+  const auto shells = detail::shellsOf(splitter, detail::trianglesOf(splitter, part.solid));
+  part.solid = {};
+  for (const detail::Shell& shell : shells) {
+    if (shell.volume < minVolume) {
+      ++result.slivers;
+      result.sliverVolume += shell.volume;
+      continue;
+    }
+    MeshPiece piece;
+    std::size_t firstInside = 0;
+    piece.mesh = source.meshOf(splitter, shell, firstInside);
+    piece.code = part.code;
+    piece.mass = massProperties(piece.mesh);
+    piece.boxMin = piece.boxMax = piece.mesh.positions[0];
+    for (const Vec3d& p : piece.mesh.positions) {
+      piece.boxMin = min(piece.boxMin, p);
+      piece.boxMax = max(piece.boxMax, p);
+    }
+    std::vector<InnerTriangle> inner;
+    for (std::size_t f = firstInside; f < piece.mesh.faceCount(); ++f) {
+      const auto v = piece.mesh.face(f);
+      const Vec3d &a = piece.mesh.positions[v[0]], &b = piece.mesh.positions[v[1]],
+                  &c = piece.mesh.positions[v[2]];
+      inner.push_back({placeOf({a, b, c}), 0, length(cross(b - a, c - a)) / 2});
+    }
+    result.pieces.push_back(std::move(piece));
+    result.inner.push_back(std::move(inner));
+  }
+  return result;
+}
+
+void findNeighbours(std::vector<MeshPiece>& pieces, std::vector<InnerTriangle> inner) {
+  std::sort(inner.begin(), inner.end(), [](const InnerTriangle& a, const InnerTriangle& b) {
+    return a.place != b.place ? a.place < b.place : a.piece < b.piece;
+  });
+  std::map<std::pair<std::uint32_t, std::uint32_t>, double> areas;
+  for (std::size_t i = 0; i + 1 < inner.size(); ++i)
+    if (inner[i].place == inner[i + 1].place && inner[i].piece != inner[i + 1].piece)
+      areas[{inner[i].piece, inner[i + 1].piece}] += inner[i].area;
+  for (const auto& [pair, area] : areas) {
+    pieces[pair.first].neighbours.push_back({pair.second, area});
+    pieces[pair.second].neighbours.push_back({pair.first, area});
+  }
+  for (MeshPiece& piece : pieces)
+    std::sort(piece.neighbours.begin(), piece.neighbours.end(),
+              [](const PieceContact& a, const PieceContact& b) { return a.piece < b.piece; });
+}
+
+}  // namespace
+
+MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progress& progress) {
+  require(std::isfinite(options.minVolume) && options.minVolume >= 0,
+          fmt::format("cut: minVolume must be finite and >= 0, got {}", options.minVolume));
+  const std::vector<CutPlane> planes = cutPlanes(options.planes);
+  const std::vector<Vec3d> cells = cellPoints(options.cells);
+  const CutSource source(mesh);
+
+  progress.begin("cut");
+  std::vector<Family> families(std::max<std::size_t>(cells.size(), 1));
+  parallelFor(
+      families.size(), 1,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          Family& family = families[i];
+          family.splitter = std::make_unique<SolidSplitter>(source.positions(), source.triangles(), cells,
+                                                            source.tolerance());
+          Part whole;
+          whole.solid =
+              cells.empty() ? family.splitter->source() : cellOf(*family.splitter, cells, std::uint32_t(i));
+          if (!whole.solid.isEmpty()) family.parts.push_back(std::move(whole));
+          splitByPlanes(family, planes, progress);
+          std::vector<Solid*> solids;
+          for (Part& part : family.parts) solids.push_back(&part.solid);
+          family.splitter->finish(solids);
+        }
+      },
+      progress);
+
+  if (cells.size() > 1) alignCutPoints(families, source.tolerance());
+
+  progress.begin("pieces");
+  std::vector<std::pair<std::size_t, std::size_t>> work;
+  for (std::size_t i = 0; i < families.size(); ++i)
+    for (std::size_t k = 0; k < families[i].parts.size(); ++k) work.push_back({i, k});
+  std::vector<Assembly> assemblies(work.size());
+  const double minVolume = std::max(options.minVolume, 1e-12 * source.volume());
+  parallelFor(
+      work.size(), 1,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          Family& family = families[work[i].first];
+          assemblies[i] = assemble(source, *family.splitter, family.parts[work[i].second], minVolume);
+        }
+      },
+      progress);
+
+  MeshPieces result;
+  std::vector<InnerTriangle> inner;
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    Assembly& assembly = assemblies[i];
+    for (std::size_t k = 0; k < assembly.pieces.size(); ++k) {
+      for (InnerTriangle& triangle : assembly.inner[k]) {
+        triangle.piece = std::uint32_t(result.pieces.size());
+        inner.push_back(triangle);
+      }
+      if (!cells.empty()) assembly.pieces[k].cell = std::uint32_t(work[i].first);
+      result.pieces.push_back(std::move(assembly.pieces[k]));
+    }
+    result.slivers += assembly.slivers;
+    result.sliverVolume += assembly.sliverVolume;
+    assembly = {};
+  }
+  findNeighbours(result.pieces, std::move(inner));
+  return result;
+}
+
+}  // namespace nephele
