@@ -27,7 +27,8 @@ struct MassProperties {
 MassProperties massProperties(const Mesh& mesh);
 
 struct MeshCutOptions {
-  /// Flat blades. Rough blades, other shapes and meshes as knives cut level sets only (`cutIntoPieces`).
+  /// Flat blades without width. Kerf, rough blades, other shapes and meshes as knives are for level sets only
+  /// (`cutIntoPieces`).
   std::vector<BladePlane> planes{};
   /// Points whose Voronoi cells part the solid, too. Empty: none.
   std::vector<Vec3f> cells{};
