@@ -4,7 +4,6 @@
 #include <toml++/toml.h>
 
 #include <cmath>
-#include <random>
 
 #include "apps/cloud_quantities.h"
 #include "modeling/density_profile.h"
@@ -167,13 +166,8 @@ CumuloLayer layerOf(const LayerRecipe& recipe, int index, const CumuloFractal& f
                   .octaves = recipe.octaves,
                   .octaveLacunarity = float(recipe.octaveLacunarity),
                   .octaveRoughness = float(recipe.octaveRoughness)};
-  // As the fractal form draws them, so that a layer keeps its seed when another key changes.
-  std::mt19937 seeds(fractal.seed);
-  for (int i = 0; i < index; ++i) {
-    seeds();
-    own.frequency = own.frequency * fractal.lacunarity;
-  }
-  own.noise.seed = recipe.seed.value_or(std::uint32_t(seeds()));
+  for (int i = 0; i < index; ++i) own.frequency = own.frequency * fractal.lacunarity;
+  own.noise.seed = recipe.seed.value_or(cumuloLayerSeed(fractal.seed, index));
   if (recipe.frequency) own.frequency = sources.field(*recipe.frequency);
   if (recipe.noise) own.noise.kind = *recipe.noise;
   if (recipe.spectrum) own.noise.spectrum = *recipe.spectrum;

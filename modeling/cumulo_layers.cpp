@@ -175,6 +175,12 @@ CumuloLayer cumuloLayer(const CumuloNoise& options) {
   return layer;
 }
 
+std::uint32_t cumuloLayerSeed(std::uint32_t seed, int index) {
+  std::mt19937 seeds(seed);
+  seeds.discard(static_cast<unsigned long long>(index));
+  return static_cast<std::uint32_t>(seeds());
+}
+
 std::vector<CumuloLayer> cumuloLayers(const CumuloFractal& fractal) {
   require(fractal.layers >= 1 && fractal.layers <= kMaxCumuloLayers,
           "cumuloLayers: layers must be 1 to " + std::to_string(kMaxCumuloLayers) + ", got " +
@@ -186,9 +192,8 @@ std::vector<CumuloLayer> cumuloLayers(const CumuloFractal& fractal) {
   ScalarField amplitude = settled(fractal.amplitude);
   const ScalarField roughness = settled(fractal.roughness), lacunarity = settled(fractal.lacunarity);
   const ScalarField billow = settled(fractal.billow), billowScale = settled(fractal.billowScale);
-  std::mt19937 seeds(fractal.seed);
   for (int i = 0; i < fractal.layers; ++i) {
-    noise.noise.seed = static_cast<std::uint32_t>(seeds());
+    noise.noise.seed = cumuloLayerSeed(fractal.seed, i);
     CumuloLayer layer = cumuloLayer(noise);
     layer.amplitude = amplitude;
     layer.billow = billow;

@@ -68,6 +68,10 @@ struct CumuloFractal {
 
 inline constexpr int kMaxCumuloLayers = 16;
 
+/// The seed of the noise of layer `index` (from 0) where that of the whole is `seed`: so that a layer keeps
+/// its noise when others change.
+std::uint32_t cumuloLayerSeed(std::uint32_t seed, int index);
+
 /// Layers for `cumulo`, of one kind of noise; see `cumuloLayer`. Each layer's noise has its own seed, turn
 /// and offset: Perlin noise is 0 on its integer lattice, and layers that shared those zeros would all be
 /// still at the same places. Parameters that vary are read at the surface point, as the noise is.
