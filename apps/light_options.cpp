@@ -188,6 +188,10 @@ void addDeepShadows(CLI::App& app, LightOptions& options) {
       app, "--shadows", options.deepShadows, {{"volume", false}, {"deep", true}},
       "Where shadows come from: sweeps through the volume, or deep shadow maps, whose light must see the "
       "volume within 75 degrees of its middle.");
+  addChoice(app, "--shadow-detail", options.lights.shadowDetail, {{"1", 1}, {"2", 2}, {"4", 4}},
+            "Points per voxel, along each axis, where sweeps keep the shadow. 2 is for volumes whose voxels "
+            "are nearly "
+            "opaque: eight times the memory.");
   app.add_option_function<double>(
          "--shadow-tolerance",
          [&options](double x) { options.deepTolerance = finite("--shadow-tolerance", x); },

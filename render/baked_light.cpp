@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "render/deep_shadow.h"
+#include "render/finer_density.h"
 
 namespace nephele::detail {
 
@@ -38,10 +39,14 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
   const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
+  std::optional<RenderVolume> finer;
+  if (lights.shadowDetail > 1 && (!distant.empty() || !lights.locals.empty()))
+    finer.emplace(finerDensity(grid, lights.shadowDetail));
+  const RenderVolume& shading = finer ? *finer : volume;
   suns.reserve(distant.size());
   for (const DistantLight& sun : distant) {
     progress.begin("light " + sun.name);
-    LightVolume& light = suns.emplace_back(volume, sun.direction, progress);
+    LightVolume& light = suns.emplace_back(shading, sun.direction, progress);
     shadowDeeply(volume, sun, light, progress);
     if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
     scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()},
@@ -52,7 +57,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   locals.reserve(lights.locals.size());
   for (const LocalLight& light : lights.locals) {
     progress.begin("light " + light.name);
-    ProjectedLightVolume& shadows = locals.emplace_back(volume, light, progress);
+    ProjectedLightVolume& shadows = locals.emplace_back(shading, light, progress);
     shadowDeeply(volume, light, shadows, progress);
     if (surfaces && surfaces->castsShadows()) shadows.addShade(toShade, columnPerDepth(light.shadow));
   }

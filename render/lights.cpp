@@ -70,6 +70,8 @@ void Lights::check() const {
                         light.decayStart));
     if (light.cone) checkCone(light.name, *light.cone);
   }
+  require(shadowDetail == 1 || shadowDetail == 2 || shadowDetail == 4,
+          fmt::format("shadow detail: expected 1, 2 or 4 nodes per voxel, got {}", shadowDetail));
   std::set<std::string> seen;
   for (const std::string& name : names()) {
     require(!name.empty() && name.find_first_of(". ,=") == std::string::npos,

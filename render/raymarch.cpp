@@ -156,8 +156,13 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
   const int spots = lights.map ? MarchScene::kMostSuns - int(Lights::kMost) : 0;
   const double others = (options.surfaces ? double(options.surfaces->memoryBytes()) : 0.0) +
                         (options.holdout ? double(options.holdout->memoryBytes()) : 0.0);
-  return others + double(lights.suns.size() + std::size_t(spots)) * LightVolume::estimateBytes(volume) +
-         double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume) + scattered.working +
+  const double perNode = double(lights.shadowDetail) * lights.shadowDetail * lights.shadowDetail;
+  const double shadows =
+      perNode * (double(lights.suns.size() + std::size_t(spots)) * LightVolume::estimateBytes(volume) +
+                 double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume));
+  const double finer =
+      perNode > 1 ? perNode * double(volume.occupiedBricks().size()) * BrickGrid::kVolume * sizeof(float) : 0;
+  return others + shadows + finer + scattered.working +
          3.0 * double(lights.names().size() + std::size_t(spots) + volume.hasEmission()) * scattered.kept +
          double(camera.window().width()) * camera.window().height() * floats * sizeof(float);
 }

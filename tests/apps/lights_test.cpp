@@ -96,6 +96,7 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
       {"--spot 0,0,4,0,0,0,95,5,10", "--spot: got '0,0,4,0,0,0,95,5,10'", 2},
       {"--sun 1,2,3,4", "--sun: got '1,2,3,4'", 2},
       {"--light-decay cubic", "--light-decay: got 'cubic'", 2},
+      {"--shadow-detail 3", "--shadow-detail: got '3'", 2},
       {"--shadow-multiplier 1,2", "--shadow-multiplier: got '1,2'", 2},
       {"--sky 1,2", "--sky: got '1,2'", 2},
       {"--write-deep-shadow a.png", "--write-deep-shadow: got 'a.png'", 2},
