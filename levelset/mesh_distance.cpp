@@ -8,7 +8,8 @@
 // a quarter more, whatever the width.
 //
 // The first two levels come from signedBand, the wider ones from queries of a bounding volume hierarchy,
-// limited to the samples that interpolation reads, with the fine level's sign.
+// limited to the samples that interpolation reads, with the fine level's sign. So does the second level of a
+// mesh whose triangles are small beside its voxels.
 //
 // Near the medial axis, where the nearest point jumps, a coarse level rounds the ridge over one of its own
 // voxels.
@@ -304,6 +305,13 @@ std::shared_ptr<BrickGrid> coarseLevel(const NearestOnMesh& mesh, const BrickGri
   return grid;
 }
 
+/// Whether triangles are so small beside voxels that asking for the nearest one, sample by sample, costs less
+/// than letting all of them compete for the samples of a wide band.
+bool isDense(const Mesh& mesh, double voxelSize) {
+  constexpr double kMostPerVoxel = 3;
+  return double(mesh.faceCount()) > kMostPerVoxel * surfaceArea(mesh) / (voxelSize * voxelSize);
+}
+
 std::shared_ptr<BrickGrid> bandLevel(const Mesh& mesh, const detail::SurfaceGeometry& surface,
                                      const detail::BandOptions& options, const Progress& progress) {
   if (const auto band = detail::signedBand(surface, options, progress)) return detail::bandToBricks(*band);
@@ -344,7 +352,7 @@ ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options, c
     };
     const Extent voxels{extent(exterior), extent(interior)};
     Level level;
-    if (index < 2) {
+    if (index == 0 || (index == 1 && !isDense(mesh, h * factor))) {
       level.grid =
           bandLevel(mesh, surface, {h * factor, voxels.outside / factor, voxels.inside / factor}, progress);
     } else {

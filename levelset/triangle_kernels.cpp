@@ -19,20 +19,10 @@ namespace nephele::detail::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 constexpr int kSide = 8;
+constexpr int kSquaresAcross = kSide / 2, kSquares = kSquaresAcross * kSquaresAcross;
 constexpr float kHalfRow = 3.5f;
 /// Keeps bounds bounds.
 constexpr float kRounding = 1.00001f;
-
-struct RowRange {
-  int first, last;
-};
-
-/// Samples of 0 .. 7 within `band` of three coordinates.
-inline RowRange rowsNear(float a, float b, float c, float band) {
-  const float low = std::min(a, std::min(b, c)) - band, high = std::max(a, std::max(b, c)) + band;
-  return {low > 0 ? int(std::ceil(std::min(low, 8.0f))) : 0,
-          high < 7 ? int(std::floor(std::max(high, -1.0f))) : 7};
-}
 
 void nearest(const TriangleShape* shapes, const PlacedTriangle* placed, std::size_t count, float band,
              NearestSamples& samples) {
@@ -41,30 +31,54 @@ void nearest(const TriangleShape* shapes, const PlacedTriangle* placed, std::siz
   const int lanes = int(hn::Lanes(d));
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  // Per row: an upper bound of what its samples have found.
+  // Upper bounds of what the samples of each row have found, and those of each square of 2 x 2 rows.
   float reach[kSide * kSide];
   std::fill_n(reach, kSide * kSide, band);
-  float most = band;
+  alignas(64) float squareReach[kSquares], squareY[kSquares], squareZ[kSquares];
+  for (int i = 0; i < kSquares; ++i) {
+    squareReach[i] = band;
+    squareY[i] = float(2 * (i % kSquaresAcross)) + 0.5f;
+    squareZ[i] = float(2 * (i / kSquaresAcross)) + 0.5f;
+  }
+  const V half = hn::Set(d, 0.5f);
   for (std::size_t k = 0; k < count; ++k) {
+    const Vec3f m = placed[k].middle;
+    const float mx = std::max(std::abs(m.x - kHalfRow) - kHalfRow, 0.0f), radius = placed[k].radius;
+    std::uint32_t near = 0;
+    for (int i = 0; i < kSquares; i += lanes) {
+      const auto beyond = [&](const float* middles, float at) {
+        return hn::Max(hn::Sub(hn::AbsDiff(hn::Load(d, middles + i), hn::Set(d, at)), half), zero);
+      };
+      const V dy = beyond(squareY, m.y), dz = beyond(squareZ, m.z);
+      const V away = hn::Add(hn::Add(hn::Set(d, mx * mx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
+      const V most = hn::Add(hn::Load(d, squareReach + i), hn::Set(d, radius));
+      // Rounding must not take away what the test of a row would keep.
+      const auto mask = hn::Le(away, hn::Mul(hn::Mul(most, most), hn::Set(d, kRounding)));
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(d, mask, bits);
+      near |= std::uint32_t(bits[0]) << i;
+    }
+    if (near == 0) continue;
     const TriangleShape& s = shapes[placed[k].index];
     const Vec3f a = placed[k].corner;
-    constexpr std::size_t kReview = 8;
-    if (k % kReview == 0) most = *std::max_element(reach, reach + kSide * kSide);
-    const RowRange ys = rowsNear(a.y, a.y + s.ab.y, a.y + s.ac.y, most);
-    const RowRange zs = rowsNear(a.z, a.z + s.ab.z, a.z + s.ac.z, most);
-    const RowRange xs = rowsNear(a.x, a.x + s.ab.x, a.x + s.ac.x, most);
-    if (xs.first > xs.last) continue;
     const float planeSlack = kHalfRow * std::abs(s.normal.x);
-    const Vec3f m = placed[k].middle;
-    const float mx = std::max(std::abs(m.x - kHalfRow) - kHalfRow, 0.0f);
     const auto code = hn::Set(di, std::int32_t(placed[k].index) * 8);
-    for (int z = zs.first; z <= zs.last; ++z)
-      for (int y = ys.first; y <= ys.last; ++y) {
+    const float lowY = std::min(0.0f, std::min(s.ab.y, s.ac.y)),
+                highY = std::max(0.0f, std::max(s.ab.y, s.ac.y));
+    const float lowZ = std::min(0.0f, std::min(s.ab.z, s.ac.z)),
+                highZ = std::max(0.0f, std::max(s.ab.z, s.ac.z));
+    for (; near != 0; near &= near - 1) {
+      const int square = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+      for (int row = 0; row < 4; ++row) {
+        const int y = 2 * (square % kSquaresAcross) + (row & 1),
+                  z = 2 * (square / kSquaresAcross) + (row >> 1);
         const float pyScalar = float(y) - a.y, pzScalar = float(z) - a.z;
         const float middle = s.normal.x * (kHalfRow - a.x) + s.normal.y * pyScalar + s.normal.z * pzScalar;
         const float rowReach = reach[z * kSide + y];
         if (std::abs(middle) > rowReach + planeSlack) continue;
-        const float my = float(y) - m.y, mz = float(z) - m.z, sphereReach = rowReach + placed[k].radius;
+        if (std::max(lowY - pyScalar, pyScalar - highY) > rowReach) continue;
+        if (std::max(lowZ - pzScalar, pzScalar - highZ) > rowReach) continue;
+        const float my = float(y) - m.y, mz = float(z) - m.z, sphereReach = rowReach + radius;
         if (mx * mx + my * my + mz * mz > sphereReach * sphereReach) continue;
         bool changed = false;
         const V py = hn::Set(d, pyScalar), pz = hn::Set(d, pzScalar);
@@ -121,8 +135,11 @@ void nearest(const TriangleShape* shapes, const PlacedTriangle* placed, std::siz
           for (int x = 0; x < kSide; x += lanes)
             farthest = hn::Max(farthest, hn::Load(d, samples.squared + (z * kSide + y) * kSide + x));
           reach[z * kSide + y] = std::sqrt(hn::GetLane(hn::MaxOfLanes(d, farthest))) * kRounding;
+          const float* of = reach + (z & ~1) * kSide + (y & ~1);
+          squareReach[square] = std::max(std::max(of[0], of[1]), std::max(of[kSide], of[kSide + 1]));
         }
       }
+    }
   }
 }
 
