@@ -59,6 +59,8 @@ Verb cloudVerb();
 Verb advectVerb();
 Verb wispsVerb();
 Verb meshVerb();
+Verb cutVerb();
+Verb transferVerb();
 Verb renderVerb();
 Verb turntableVerb();
 Verb infoVerb();

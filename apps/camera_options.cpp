@@ -17,19 +17,7 @@ constexpr double kAny = std::numeric_limits<double>::max();
 constexpr int kPoses = 17;
 
 void addPicture(CLI::App& app, CameraOptions& options) {
-  app.add_option_function<std::string>(
-         "--size",
-         [&options](const std::string& text) {
-           int width = 0, height = 0, used = 0;
-           if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
-               std::size_t(used) != text.size() || width < 1 || height < 1 || width > 65536 || height > 65536)
-             refuseValue("--size", text, "WxH, each 1 to 65536");
-           options.frame.width = width;
-           options.frame.height = height;
-         },
-         "Pixels across and down.")
-      ->type_name("WxH")
-      ->default_str(fmt::format("{}x{}", options.frame.width, options.frame.height));
+  addSize(app, "--size", options.frame.width, options.frame.height, "Pixels across and down.");
   app.add_option_function<std::string>(
          "--crop",
          [&options](const std::string& text) {

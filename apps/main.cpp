@@ -8,6 +8,6 @@ int main(int argc, char** argv) {
   // stage.
   mallopt(M_MMAP_THRESHOLD, 1 << 17);
   return runProgram(argc, argv,
-                    {levelsetVerb(), cloudVerb(), advectVerb(), wispsVerb(), meshVerb(), renderVerb(),
-                     turntableVerb(), infoVerb()});
+                    {levelsetVerb(), cloudVerb(), advectVerb(), wispsVerb(), meshVerb(), cutVerb(),
+                     transferVerb(), renderVerb(), turntableVerb(), infoVerb()});
 }

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "levelset/marching_cubes.h"
 #include "levelset/mesh_io.h"
 #include "levelset/vdb_io.h"
-#include "render/exr_io.h"
+#include "render/texture_image.h"
 
 namespace nephele::apps {
 namespace {
@@ -19,18 +18,6 @@ Mesh readObject(const std::string& path) {
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
     throw Error(fmt::format("{}: grid '{}' is not a level set, which objects are", path, info.name));
   return marchingCubes(*toBricks(grid));
-}
-
-// What the numbers of 8 and 16 bit files stand for: they are on the sRGB curve.
-std::shared_ptr<const Image> readTexture(const std::string& path) {
-  auto image = std::make_shared<Image>(readImage(path));
-  for (const char* name : {"R", "G", "B"})
-    if (!image->find(name))
-      throw Error(fmt::format("{}: has no channel {}, which textures need", path, name));
-  if (path.ends_with(".png"))
-    for (Image::Channel& channel : image->channels)
-      for (float& v : channel.values) v = v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
-  return image;
 }
 
 bool hasCoordinates(const Mesh& mesh) {
@@ -81,7 +68,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
 
 std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume) const {
   std::vector<SurfaceObject> all;
-  const auto image = texture.empty() ? nullptr : readTexture(texture);
+  const auto image = texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(texture));
   for (const std::string& path : objects) {
     SurfaceObject object{readObject(path), colour, checkers, image};
     if ((checkers > 0 || image) && !hasCoordinates(object.mesh))

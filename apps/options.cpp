@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <numeric>
@@ -214,6 +215,39 @@ std::string closestWord(const std::string& word, const std::vector<std::string>&
     }
   }
   return best;
+}
+
+CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& height,
+                     const std::string& description) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, &width, &height](const std::string& text) {
+            int w = 0, h = 0, used = 0;
+            if (std::sscanf(text.c_str(), "%dx%d%n", &w, &h, &used) != 2 ||
+                std::size_t(used) != text.size() || w < 1 || h < 1 || w > 65536 || h > 65536)
+              refuseValue(name, text, "WxH, each 1 to 65536");
+            width = w;
+            height = h;
+          },
+          description)
+      ->type_name("WxH")
+      ->default_str(fmt::format("{}x{}", width, height));
+}
+
+void addPreviewFrame(CLI::App& app, CLI::Option* preview, int& width, int& height, float& azimuthDegrees,
+                     float& elevationDegrees) {
+  addSize(app, "--size", width, height, "Pixels across and down.")->needs(preview);
+  addNumbers(
+      app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360,
+      [&azimuthDegrees, &elevationDegrees](const Vec3f& v) {
+        azimuthDegrees = v.x;
+        elevationDegrees = v.y;
+      },
+      "Where the camera stands, in degrees: azimuth from the front (+z) towards +x, elevation from the "
+      "horizon.")
+      ->default_str(fmt::format("{:g},{:g}", azimuthDegrees, elevationDegrees))
+      ->needs(preview);
 }
 
 }  // namespace nephele::apps

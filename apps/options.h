@@ -47,6 +47,12 @@ CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, cons
 /// A finite number in [low, high].
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
                        const std::string& description);
+/// Declares a size in pixels, each side from 1 to 65536.
+CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& height,
+                     const std::string& description);
+/// Declares --size and --view of a picture that `preview` asks for.
+void addPreviewFrame(CLI::App& app, CLI::Option* preview, int& width, int& height, float& azimuthDegrees,
+                     float& elevationDegrees);
 /// As addNumber, for a number that need not be given.
 CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
                          double high, const std::string& description);

@@ -10,12 +10,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/carve.h"
 #include "modeling/error.h"
 
 namespace nephele::detail {
 namespace {
 
-/// Edges without as many faces one way as the other.
+bool hasUv(const Mesh& mesh) {
+  return std::any_of(mesh.attributes.begin(), mesh.attributes.end(),
+                     [](const MeshAttribute& a) { return a.name == "uv" && a.width == 2; });
+}
+
+}  // namespace
+
 std::size_t openEdges(const std::vector<TriangleIndices>& triangles) {
   std::vector<std::pair<std::uint64_t, int>> edges;
   edges.reserve(3 * triangles.size());
@@ -34,18 +41,12 @@ std::size_t openEdges(const std::vector<TriangleIndices>& triangles) {
   return open;
 }
 
-bool hasUv(const Mesh& mesh) {
-  return std::any_of(mesh.attributes.begin(), mesh.attributes.end(),
-                     [](const MeshAttribute& a) { return a.name == "uv" && a.width == 2; });
-}
-
-}  // namespace
-
-CutSource::CutSource(const Mesh& mesh) : mesh_(triangulated(mesh)) {
-  require(mesh_.faceCount() > 0, "cut: the mesh has no faces");
-  require(mesh_.faceCount() < kSourceEdge, "cut: the mesh has more than 1 073 741 823 triangles");
+CutSource::CutSource(const Mesh& mesh, const std::string& name) : mesh_(triangulated(mesh)) {
+  require(mesh_.faceCount() > 0, fmt::format("cut: {} has no faces", name));
+  require(mesh_.faceCount() < kSourceEdge,
+          fmt::format("cut: {} has more than 1 073 741 823 triangles", name));
   for (const Vec3d& p : mesh_.positions)
-    require(isFinite(p), "cut: the mesh has a position that is not finite");
+    require(isFinite(p), fmt::format("cut: {} has a position that is not finite", name));
   const auto take = [&](const std::vector<std::uint32_t>& same) {
     triangles_.clear();
     faceOf_.clear();
@@ -60,35 +61,55 @@ CutSource::CutSource(const Mesh& mesh) : mesh_(triangulated(mesh)) {
   };
   if (take({}) != 0) {
     const std::size_t open = take(firstEqualPosition(mesh_.positions));
-    require(open == 0, fmt::format("cut: the mesh is open: {} edges have no face on their other side", open));
+    require(open == 0, fmt::format("cut: {} is open: {} edges have no face on their other side", name, open));
   }
-  require(!triangles_.empty(), "cut: the mesh has no faces with an area");
+  require(!triangles_.empty(), fmt::format("cut: {} has no faces with an area", name));
   volume_ = signedVolume(mesh_);
   require(volume_ > 0,
-          fmt::format("cut: the mesh must enclose a volume, facing outwards; its volume is {}", volume_));
-  Vec3d low = positions()[triangles_[0][0]], high = low, far{};
+          fmt::format("cut: {} must enclose a volume, facing outwards; its volume is {}", name, volume_));
+  positions_ = mesh_.positions;
+  Vec3d far{};
+  low_ = high_ = positions_[triangles_[0][0]];
   for (const TriangleIndices& t : triangles_)
     for (const std::uint32_t v : t) {
       const Vec3d& p = positions()[v];
-      low = min(low, p);
-      high = max(high, p);
+      low_ = min(low_, p);
+      high_ = max(high_, p);
       far = max(far, max(p, -p));
     }
-  tolerance_ = 1e-11 * length(high - low) + 4e-16 * length(far);
+  tolerance_ = 1e-11 * length(high_ - low_) + 4e-16 * length(far);
   groups_.assign(mesh_.faceCount(), 0);
   for (std::uint32_t g = 0; g < mesh_.groups.size(); ++g)
     std::fill_n(groups_.begin() + mesh_.groups[g].firstFace, mesh_.groups[g].faceCount, g + 1);
 }
 
 std::uint32_t CutSource::groupOf(std::uint32_t face) const {
-  return face & kOnPlane ? std::uint32_t(mesh_.groups.size() + 1) : groups_[faceOf_[face]];
+  return isInner(face) ? std::uint32_t(mesh_.groups.size() + 1) : groups_[faceOf_[face]];
 }
 
-CutSource::Weights CutSource::weightsAt(std::uint32_t triangle, std::uint32_t vertex, const Vec3d& p) const {
-  const TriangleIndices& v = triangles_[triangle];
-  for (std::size_t k = 0; k < 3; ++k)
-    if (v[k] == vertex) return {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
-  const Vec3d &a = positions()[v[0]], &b = positions()[v[1]], &c = positions()[v[2]];
+void CutSource::refine(Carved&& carved) {
+  positions_ = std::move(carved.positions);
+  triangles_ = std::move(carved.triangles);
+  frames_ = std::move(carved.frames);
+  std::vector<std::uint32_t> faces;
+  faces.reserve(carved.parents.size());
+  for (const std::uint32_t parent : carved.parents)
+    faces.push_back(parent & kOnPlane ? parent : faceOf_[parent]);
+  faceOf_ = std::move(faces);
+}
+
+PlaneFrame CutSource::frameOf(const SolidSplitter& splitter, std::uint32_t face) const {
+  if (face & kOnPlane) return PlaneFrame::of(splitter.planes()[face & ~kOnPlane].normal);
+  return frames_[faceOf_[face] & ~kOnPlane];
+}
+
+CutSource::Weights CutSource::weightsAt(std::uint32_t triangle, const Vec3d& p) const {
+  const std::size_t corner = 3 * std::size_t(faceOf_[triangle]);
+  const Vec3d &a = mesh_.positions[mesh_.corners[corner]], &b = mesh_.positions[mesh_.corners[corner + 1]],
+              &c = mesh_.positions[mesh_.corners[corner + 2]];
+  if (p == a) return {1, 0, 0};
+  if (p == b) return {0, 1, 0};
+  if (p == c) return {0, 0, 1};
   const Vec3d normal = cross(b - a, c - a);
   const double area = dot(normal, normal);
   if (area == 0) return {1, 0, 0};
@@ -112,7 +133,10 @@ Mesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell, std::s
     const std::uint32_t here = groupOf(shell.triangles[order[i]].face);
     if (here != group) {
       const bool isInside = here > mesh_.groups.size();
-      mesh.groups.push_back({isInside ? "inside" : mesh_.groups[here - 1].name, i, 0});
+      if (isInside)
+        mesh.groups.push_back({"inside", i, 0});
+      else
+        mesh.groups.push_back({mesh_.groups[here - 1].name, i, 0, mesh_.groups[here - 1].material});
       if (isInside) firstInside = i;
       group = here;
     }
@@ -141,22 +165,18 @@ void CutSource::addAttribute(const MeshAttribute& attribute, const SolidSplitter
   std::vector<bool> isSet(perVertex ? mesh.positions.size() : 0);
   for (std::size_t f = 0; f < order.size(); ++f) {
     const SolidTriangle& t = shell.triangles[order[f]];
-    Vec3d u{}, v{};
-    if (t.face & kOnPlane) {
-      if (!isUv) continue;
-      const Vec3d& n = splitter.planes()[t.face & ~kOnPlane].normal;
-      u = normalize(std::abs(n.y) < 0.9 ? cross(Vec3d{0, 1, 0}, n) : cross(Vec3d{0, 0, 1}, n));
-      v = cross(n, u);
-    }
+    const bool inner = isInner(t.face);
+    if (inner && !isUv) continue;
+    const PlaneFrame frame = inner ? frameOf(splitter, t.face) : PlaneFrame{};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t vertex = t.vertices[k], number = mesh.corners[3 * f + k];
       const Vec3d& p = splitter.position(vertex);
       float* value = result.values.data() + width * (perVertex ? number : 3 * f + k);
-      if (t.face & kOnPlane) {
-        value[0] = float(dot(p, u));
-        value[1] = float(dot(p, v));
+      if (inner) {
+        value[0] = float(dot(p, frame.u));
+        value[1] = float(dot(p, frame.v));
       } else if (!attribute.values.empty() && !(perVertex && isSet[number])) {
-        const Weights w = weightsAt(t.face, vertex, p);
+        const Weights w = weightsAt(t.face, p);
         for (std::size_t i = 0; i < width; ++i)
           value[i] = float(w[0] * double(valueAt(t.face, 0)[i]) + w[1] * double(valueAt(t.face, 1)[i]) +
                            w[2] * double(valueAt(t.face, 2)[i]));

@@ -12,32 +12,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "levelset/disjoint_sets.h"
 #include "levelset/mesh_repair.h"
 
 namespace nephele {
 namespace {
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-  }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    if (a < b)
-      parent_[b] = a;
-    else
-      parent_[a] = b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // One side of a face on an edge. The edge belongs to its smaller vertex.
 struct EdgeUse {
@@ -152,7 +131,7 @@ MeshDiagnosis diagnose(const Mesh& mesh) {
   std::partial_sum(start.begin(), start.end(), start.begin());
   std::vector<EdgeUse> uses(start.back());
   std::vector<std::uint32_t> fill(start.begin(), start.end() - 1);
-  DisjointSets parts(positionCount), fans(mesh.corners.size());
+  detail::DisjointSets parts(positionCount), fans(mesh.corners.size());
   forEachSide([&](std::uint32_t c, std::uint32_t next, std::uint32_t a, std::uint32_t b) {
     if (a != b) {
       uses[fill[std::min(a, b)]++] = {std::max(a, b), c, next, a < b};
@@ -162,7 +141,7 @@ MeshDiagnosis diagnose(const Mesh& mesh) {
     }
   });
 
-  DisjointSets loops(positionCount);
+  detail::DisjointSets loops(positionCount);
   std::vector<bool> onBoundary(positionCount);
   std::size_t edges = 0;
   for (std::uint32_t v = 0; v < positionCount; ++v) {
@@ -194,13 +173,13 @@ MeshDiagnosis diagnose(const Mesh& mesh) {
     }
   }
   for (std::uint32_t v = 0; v < positionCount; ++v) {
-    d.components += vertexUsed[v] && parts.find(v) == v;
-    d.boundaryLoops += onBoundary[v] && loops.find(v) == v;
+    d.components += vertexUsed[v] && parts.root(v) == v;
+    d.boundaryLoops += onBoundary[v] && loops.root(v) == v;
   }
   std::vector<std::uint8_t> fanCount(positionCount);
   for (std::uint32_t c = 0; c < mesh.corners.size(); ++c) {
     std::uint8_t& count = fanCount[vertexOf[mesh.corners[c]]];
-    if (fans.find(c) == c && count < 2) ++count;
+    if (fans.root(c) == c && count < 2) ++count;
   }
   d.nonManifoldVertices = static_cast<std::size_t>(std::count(fanCount.begin(), fanCount.end(), 2));
   d.eulerCharacteristic =

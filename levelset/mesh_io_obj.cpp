@@ -1,20 +1,19 @@
 // Wavefront OBJ.
 //
 // Read: v (with optional colour behind x y z), vt, f with v, v/vt, v//vn and v/vt/vn, negative (relative)
-// indices, polygons, g and o as groups, continuation lines. Normals are checked for range and otherwise
-// dropped; materials, lines, points, curves and smoothing groups are passed over. Indices may point forward,
-// as some exporters do; they are checked at the end. Written: shortest decimal forms that read back to the
-// same value (the same float where the value is a float).
+// indices, polygons, g and o as groups, usemtl as their materials, continuation lines. Normals are checked
+// for range and otherwise dropped; lines, points, curves and smoothing groups are passed over. Indices may
+// point forward, as some exporters do; they are checked at the end. Written: shortest decimal forms that read
+// back to the same value (the same float where the value is a float).
 #include <fmt/format.h>
 
-#include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <string>
-#include <unordered_map>
 
 #include "levelset/mesh_io_private.h"
+#include "levelset/obj_text.h"
 #include "modeling/error.h"
 
 namespace nephele::detail {
@@ -69,6 +68,13 @@ class ObjReader {
         ++uvRange_.count;
       } else if (keyword == "g" || keyword == "o") {
         startGroup(scanner_.rest());
+      } else if (keyword == "usemtl") {
+        closeGroup();
+        material_ = scanner_.rest();
+        hasGroups_ = true;
+      } else if (keyword == "mtllib") {
+        const std::filesystem::path library(scanner_.rest());
+        mesh_.materialFiles.push_back((std::filesystem::path(file_.path).parent_path() / library).string());
       }
     }
     vertexRange_.check(file_);
@@ -125,10 +131,12 @@ class ObjReader {
   void closeGroup() {
     const auto end = static_cast<std::uint32_t>(mesh_.faceCount());
     if (end > groupStart_) {
-      if (!mesh_.groups.empty() && mesh_.groups.back().name == groupName_)
+      const std::string& name = groupName_.empty() ? material_ : groupName_;
+      if (!mesh_.groups.empty() && mesh_.groups.back().name == name &&
+          mesh_.groups.back().material == material_)
         mesh_.groups.back().faceCount += end - groupStart_;
       else
-        mesh_.groups.push_back({groupName_, groupStart_, end - groupStart_});
+        mesh_.groups.push_back({name.empty() ? "default" : name, groupStart_, end - groupStart_, material_});
     }
     groupStart_ = end;
   }
@@ -158,54 +166,10 @@ class ObjReader {
   IndexRange vertexRange_{"vertex"}, uvRange_{"texture"};
   std::vector<float> uvs_, colors_;
   std::vector<std::uint32_t> uvIndices_;  // per corner; shorter while the last corners have none
-  std::string groupName_ = "default";
+  std::string groupName_, material_;
   std::uint32_t groupStart_ = 0;
   bool hasGroups_ = false;
 };
-
-// Text on its way to a file, in large pieces.
-class TextWriter {
- public:
-  explicit TextWriter(std::FILE* stream) : stream_(stream) { buffer_.reserve(kFlushAt + 256); }
-  ~TextWriter() { flush(); }
-  TextWriter(const TextWriter&) = delete;
-  TextWriter& operator=(const TextWriter&) = delete;
-
-  TextWriter& text(std::string_view s) {
-    buffer_.append(s);
-    if (buffer_.size() > kFlushAt) flush();
-    return *this;
-  }
-  TextWriter& number(double value) {
-    char digits[32];
-    const auto single = static_cast<float>(value);
-    const auto end = static_cast<double>(single) == value ? std::to_chars(digits, digits + 32, single).ptr
-                                                          : std::to_chars(digits, digits + 32, value).ptr;
-    return text({digits, static_cast<std::size_t>(end - digits)});
-  }
-  TextWriter& integer(std::uint64_t value) {
-    char digits[24];
-    const auto end = std::to_chars(digits, digits + 24, value).ptr;
-    return text({digits, static_cast<std::size_t>(end - digits)});
-  }
-
- private:
-  static constexpr std::size_t kFlushAt = 1 << 16;
-
-  void flush() {
-    std::fwrite(buffer_.data(), 1, buffer_.size(), stream_);
-    buffer_.clear();
-  }
-
-  std::FILE* stream_;
-  std::string buffer_;
-};
-
-// A name on one line, as a group statement needs.
-std::string oneLine(std::string name) {
-  for (char& c : name) c = c == '\n' || c == '\r' ? ' ' : c;
-  return name;
-}
 
 }  // namespace
 
@@ -214,49 +178,9 @@ Mesh readObj(const MeshFile& file) {
 }
 
 void writeObj(std::FILE* stream, const Mesh& mesh) {
-  const MeshAttribute* color = nullptr;
-  const MeshAttribute* uv = nullptr;
-  for (const MeshAttribute& a : mesh.attributes) {
-    if (a.name == "color" && a.domain == MeshAttribute::Domain::vertex && a.width >= 3) color = &a;
-    if (a.name == "uv" && a.width == 2) uv = &a;
-  }
-
   TextWriter out(stream);
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    out.text("v");
-    for (int k = 0; k < 3; ++k) out.text(" ").number(mesh.positions[v][k]);
-    if (color)
-      for (std::size_t k = 0; k < 3; ++k)
-        out.text(" ").number(color->values[v * static_cast<std::size_t>(color->width) + k]);
-    out.text("\n");
-  }
-
-  // Each texture coordinate once per value, so that charts stay connected in other programs.
-  std::vector<std::uint32_t> uvIndex;
-  if (uv) {
-    std::unordered_map<std::uint64_t, std::uint32_t> known;
-    for (std::size_t c = 0; c < mesh.corners.size(); ++c) {
-      const std::size_t item = uv->domain == MeshAttribute::Domain::corner ? c : mesh.corners[c];
-      const float u = uv->values[2 * item], v = uv->values[2 * item + 1];
-      const std::uint64_t key =
-          std::uint64_t{std::bit_cast<std::uint32_t>(u)} << 32 | std::bit_cast<std::uint32_t>(v);
-      const auto [entry, isNew] = known.try_emplace(key, static_cast<std::uint32_t>(known.size()) + 1);
-      if (isNew) out.text("vt ").number(u).text(" ").number(v).text("\n");
-      uvIndex.push_back(entry->second);
-    }
-  }
-
-  std::size_t group = 0;
-  for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
-    while (group < mesh.groups.size() && mesh.groups[group].firstFace <= f)
-      out.text("g ").text(oneLine(mesh.groups[group++].name)).text("\n");
-    out.text("f");
-    for (std::uint32_t c = mesh.faceStart[f]; c < mesh.faceStart[f + 1]; ++c) {
-      out.text(" ").integer(std::uint64_t{mesh.corners[c]} + 1);
-      if (uv) out.text("/").integer(uvIndex[c]);
-    }
-    out.text("\n");
-  }
+  const ObjCoordinates uv = writeObjPoints(out, mesh);
+  writeObjFaces(out, mesh, uv);
 }
 
 }  // namespace nephele::detail

@@ -178,6 +178,7 @@ Mesh withMergedPositions(const Mesh& mesh) {
   Mesh result;
   result.faceStart = mesh.faceStart;
   result.groups = mesh.groups;
+  result.materialFiles = mesh.materialFiles;
   result.positions.reserve(sources.size());
   for (const std::uint32_t v : sources) result.positions.push_back(mesh.positions[v]);
   result.corners.reserve(mesh.corners.size());
@@ -230,8 +231,9 @@ Mesh selectFaces(const Mesh& mesh, const std::vector<bool>& kept, const std::vec
   }
   for (const MeshGroup& group : mesh.groups) {
     const std::uint32_t first = firstOf[group.firstFace], end = firstOf[group.firstFace + group.faceCount];
-    if (end > first) result.groups.push_back({group.name, first, end - first});
+    if (end > first) result.groups.push_back({group.name, first, end - first, group.material});
   }
+  result.materialFiles = mesh.materialFiles;
   return result;
 }
 

@@ -1,11 +1,11 @@
 // Cutting closed meshes into closed pieces.
 //
-// Planes split all parts that there are, one plane after another, so that cost follows the pieces. A Voronoi
-// cell is what the bisectors with its neighbours leave of the solid, nearest first; once the next point is
-// more than twice as far as anything that is left, no other can reach the cell (radius of security: Levy and
-// Bonneel, "Variational Anisotropic Surface Meshing with Voronoi Parallel Linear Enumeration", 2012).
-// Contacts are found by their triangles, which are the same on both sides. Everything is ordered by cell,
-// code and place in the source, never by thread.
+// What rough blades and solids leave comes first (carve.h). Planes split all parts that there are, one plane
+// after another, so that cost follows the pieces. A Voronoi cell is what the bisectors with its neighbours
+// leave of the parts, nearest first; once the next point is more than twice as far as anything that is left,
+// no other can reach the cell (radius of security: Levy and Bonneel, "Variational Anisotropic Surface Meshing
+// with Voronoi Parallel Linear Enumeration", 2012). Contacts are found by their triangles, which are the same
+// on both sides. Everything is ordered by cell, code and place in the source, never by thread.
 #include "levelset/mesh_pieces.h"
 
 #include <fmt/format.h>
@@ -15,7 +15,9 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <numeric>
 
+#include "levelset/carve.h"
 #include "levelset/cut_source.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
@@ -70,8 +72,24 @@ std::vector<Vec3d> cellPoints(const std::vector<Vec3f>& cells) {
   return points;
 }
 
-/// What is left of the solid in a cell.
-Solid cellOf(SolidSplitter& splitter, std::span<const Vec3d> cells, std::uint32_t index) {
+/// The same plane, moved along its normal; not a bisector any more.
+CutPlane moved(const CutPlane& plane, double distance) {
+  return {plane.normal, plane.offset + distance, {}};
+}
+
+/// What of the parts lies on one side of a plane.
+void keepSide(Family& family, const CutPlane& plane, int side) {
+  family.splitter->begin(plane);
+  std::erase_if(family.parts, [&](Part& part) {
+    const int box = family.splitter->sideOfBox(part.solid, plane);
+    if (box == 0)
+      part.solid = std::move(family.splitter->split(part.solid, {side == 0, side == 1})[std::size_t(side)]);
+    return part.solid.isEmpty() || box == (side == 0 ? 1 : -1);
+  });
+}
+
+/// Leaves of the parts what lies in a cell.
+void keepCell(Family& family, std::span<const Vec3d> cells, std::uint32_t index, double halfKerf) {
   const Vec3d& centre = cells[index];
   const auto squared = [&](std::uint32_t j) { return dot(cells[j] - centre, cells[j] - centre); };
   const auto isFarther = [&](std::uint32_t a, std::uint32_t b) {
@@ -81,44 +99,82 @@ Solid cellOf(SolidSplitter& splitter, std::span<const Vec3d> cells, std::uint32_
   for (std::uint32_t j = 0; j < cells.size(); ++j)
     if (j != index) others.push_back(j);
   std::make_heap(others.begin(), others.end(), isFarther);
-  Solid solid = splitter.source();
-  while (!others.empty() && !solid.isEmpty()) {
+  while (!others.empty() && !family.parts.empty()) {
     std::pop_heap(others.begin(), others.end(), isFarther);
     const std::uint32_t other = others.back();
     others.pop_back();
-    const double reach = length(max(solid.high - centre, centre - solid.low));
-    if (std::sqrt(squared(other)) > 2.000001 * reach) break;
+    double reach = 0;
+    for (const Part& part : family.parts)
+      reach = std::max(reach, length(max(part.solid.high - centre, centre - part.solid.low)));
+    if (std::sqrt(squared(other)) > 2.000001 * (reach + halfKerf)) break;
     const std::uint32_t low = std::min(index, other), high = std::max(index, other);
     const CutPlane plane = detail::bisector(cells, low, high);
     const int side = index == low ? 0 : 1;
-    if (splitter.sideOfBox(solid, plane) == (side == 0 ? -1 : 1)) continue;
-    splitter.begin(plane);
-    solid = std::move(splitter.split(solid, {side == 0, side == 1})[std::size_t(side)]);
+    const bool missesAll = std::all_of(family.parts.begin(), family.parts.end(), [&](const Part& part) {
+      const CutPlane& blade = halfKerf > 0 ? moved(plane, side == 0 ? -halfKerf : halfKerf) : plane;
+      return family.splitter->sideOfBox(part.solid, blade) == (side == 0 ? -1 : 1);
+    });
+    if (missesAll) continue;
+    keepSide(family, halfKerf > 0 ? moved(plane, side == 0 ? -halfKerf : halfKerf) : plane, side);
   }
-  return solid;
 }
 
-void splitByPlanes(Family& family, const std::vector<CutPlane>& planes, const Progress& progress) {
-  for (const CutPlane& plane : planes) {
-    progress.check();
-    family.splitter->begin(plane);
-    std::vector<Part> next;
+/// Splits the parts by a plane; with a kerf, what is left is behind one plane or before another.
+void splitByPlane(Family& family, const CutPlane& plane, double halfKerf) {
+  std::vector<Part> next;
+  const auto add = [&](Solid&& solid, const PieceCode& code, bool side) {
+    if (solid.isEmpty()) return;
+    next.push_back({std::move(solid), code});
+    next.back().code.sides.push_back(side);
+  };
+  SolidSplitter& splitter = *family.splitter;
+  if (halfKerf == 0) {
+    splitter.begin(plane);
     for (Part& part : family.parts) {
-      const int side = family.splitter->sideOfBox(part.solid, plane);
-      if (side != 0) {
-        part.code.sides.push_back(side > 0);
-        next.push_back(std::move(part));
+      const int box = splitter.sideOfBox(part.solid, plane);
+      if (box != 0) {
+        add(std::move(part.solid), part.code, box > 0);
         continue;
       }
-      auto halves = family.splitter->split(part.solid);
-      for (const std::size_t k : {0, 1}) {
-        if (halves[k].isEmpty()) continue;
-        next.push_back({std::move(halves[k]), part.code});
-        next.back().code.sides.push_back(k == 1);
-      }
+      auto halves = splitter.split(part.solid);
+      for (const std::size_t k : {0, 1}) add(std::move(halves[k]), part.code, k == 1);
     }
     family.parts = std::move(next);
+    return;
   }
+  // What is behind the first plane, and what that leaves.
+  std::vector<Part> rest;
+  const CutPlane behind = moved(plane, -halfKerf), before = moved(plane, halfKerf);
+  splitter.begin(behind);
+  for (Part& part : family.parts) {
+    const int box = splitter.sideOfBox(part.solid, behind);
+    if (box < 0) {
+      add(std::move(part.solid), part.code, false);
+    } else if (box > 0) {
+      rest.push_back(std::move(part));
+    } else {
+      auto halves = splitter.split(part.solid);
+      add(std::move(halves[0]), part.code, false);
+      if (!halves[1].isEmpty()) rest.push_back({std::move(halves[1]), part.code});
+    }
+  }
+  splitter.begin(before);
+  for (Part& part : rest) {
+    const int box = splitter.sideOfBox(part.solid, before);
+    if (box > 0) add(std::move(part.solid), part.code, true);
+    if (box == 0) add(std::move(splitter.split(part.solid, {false, true})[1]), part.code, true);
+  }
+  family.parts = std::move(next);
+}
+
+/// Codes have the sides of other knives first until all is cut; planes come before them.
+void sortByCode(std::vector<Part>& parts, std::size_t planeCount) {
+  for (Part& part : parts) {
+    auto& sides = part.code.sides;
+    std::rotate(sides.begin(), sides.end() - std::ptrdiff_t(planeCount), sides.end());
+  }
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const Part& a, const Part& b) { return a.code.sides < b.code.sides; });
 }
 
 /// Cells whose points are arranged so that more than four meet find the place of that by different ways:
@@ -241,9 +297,23 @@ void findNeighbours(std::vector<MeshPiece>& pieces, std::vector<InnerTriangle> i
 MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progress& progress) {
   require(std::isfinite(options.minVolume) && options.minVolume >= 0,
           fmt::format("cut: minVolume must be finite and >= 0, got {}", options.minVolume));
+  require(std::isfinite(options.kerf) && options.kerf >= 0,
+          fmt::format("cut: kerf must be finite and >= 0, got {}", options.kerf));
   const std::vector<CutPlane> planes = cutPlanes(options.planes);
   const std::vector<Vec3d> cells = cellPoints(options.cells);
-  const CutSource source(mesh);
+  const double halfKerf = double(options.kerf) / 2;
+  CutSource source(mesh);
+  std::vector<detail::Carved::Part> carvedParts(1);
+  if (options.rough.empty() && options.solids.empty()) {
+    carvedParts[0].triangles.resize(source.triangles().size());
+    std::iota(carvedParts[0].triangles.begin(), carvedParts[0].triangles.end(), 0u);
+  } else {
+    progress.begin("knives");
+    const auto sheets = detail::knifeSheets(options, source);
+    detail::Carved carved = detail::carve(source.positions(), source.triangles(), sheets, progress);
+    carvedParts = std::move(carved.parts);
+    source.refine(std::move(carved));
+  }
 
   progress.begin("cut");
   std::vector<Family> families(std::max<std::size_t>(cells.size(), 1));
@@ -254,11 +324,14 @@ MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progre
           Family& family = families[i];
           family.splitter = std::make_unique<SolidSplitter>(source.positions(), source.triangles(), cells,
                                                             source.tolerance());
-          Part whole;
-          whole.solid =
-              cells.empty() ? family.splitter->source() : cellOf(*family.splitter, cells, std::uint32_t(i));
-          if (!whole.solid.isEmpty()) family.parts.push_back(std::move(whole));
-          splitByPlanes(family, planes, progress);
+          for (const auto& part : carvedParts)
+            family.parts.push_back({family.splitter->solidOf(part.triangles), {part.sides}});
+          if (!cells.empty()) keepCell(family, cells, std::uint32_t(i), halfKerf);
+          for (const CutPlane& plane : planes) {
+            progress.check();
+            splitByPlane(family, plane, halfKerf);
+          }
+          sortByCode(family.parts, planes.size());
           std::vector<Solid*> solids;
           for (Part& part : family.parts) solids.push_back(&part.solid);
           family.splitter->finish(solids);

@@ -68,10 +68,9 @@ SolidSplitter::SolidSplitter(std::span<const Vec3d> positions, std::span<const T
   sign_.resize(positions.size());
 }
 
-Solid SolidSplitter::source() const {
+Solid SolidSplitter::solidOf(std::span<const std::uint32_t> triangles) const {
   Solid solid;
-  solid.whole.resize(triangles_.size());
-  for (std::uint32_t t = 0; t < triangles_.size(); ++t) solid.whole[t] = t;
+  solid.whole.assign(triangles.begin(), triangles.end());
   measure(solid);
   return solid;
 }

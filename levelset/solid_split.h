@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "levelset/triangle_tree.h"
 #include "modeling/math.h"
 
 namespace nephele::detail {
@@ -23,8 +24,6 @@ struct CutPlane {
 
 /// The plane between two cells, low < high.
 CutPlane bisector(std::span<const Vec3d> cells, std::uint32_t low, std::uint32_t high);
-
-using TriangleIndices = std::array<std::uint32_t, 3>;
 
 /// Face identifiers: a triangle of the source, or kOnPlane | a plane. Edges of a source triangle that were
 /// there before name kSourceEdge | 0, 1, 2 as what lies beyond.
@@ -63,7 +62,8 @@ class SolidSplitter {
   SolidSplitter(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
                 std::span<const Vec3d> cells, double tolerance);
 
-  Solid source() const;
+  /// The solid between triangles of the source.
+  Solid solidOf(std::span<const std::uint32_t> triangles) const;
   const Vec3d& position(std::uint32_t v) const {
     return v < source_.size() ? source_[v] : added_[v - source_.size()];
   }

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "levelset/cap_triangles.h"
+#include "levelset/disjoint_sets.h"
 
 namespace nephele::detail {
 namespace {
@@ -20,23 +21,6 @@ using Edge = std::array<std::uint32_t, 2>;
 
 // Loops of a few points need no Delaunay triangulation.
 constexpr std::size_t kFewPoints = 8;
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  std::uint32_t root(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 /// Loops without a point twice.
 std::vector<std::vector<std::uint32_t>> loopsOf(std::size_t pointCount, std::vector<Edge> edges) {
@@ -120,23 +104,25 @@ class FaceTriangles {
     return local_[std::size_t(std::lower_bound(byId_.begin(), byId_.end(), v) - byId_.begin())];
   }
 
-  /// Returns whether the face looks against the normal of its plane.
+  /// Returns whether the face looks against the direction that it is seen from, the same for both sides.
   bool layFlat(std::uint32_t id) {
     const Vec3d origin = splitter_.position(vertices_[0]);
     Vec3d area{};
     for (const SolidEdge& edge : solidEdges_)
       area += cross(splitter_.position(edge.from) - origin, splitter_.position(edge.to) - origin);
-    Vec3d normal = area;
-    bool isFlipped = false;
+    Vec3d normal;
     if (id & kOnPlane) {
       normal = splitter_.planes()[id & ~kOnPlane].normal;
-      isFlipped = dot(area, normal) < 0;
+    } else {
+      const TriangleIndices& t = splitter_.triangle(id);
+      const Vec3d a = splitter_.position(t[0]);
+      normal = cross(splitter_.position(t[1]) - a, splitter_.position(t[2]) - a);
     }
     int axis = 0;
     for (const int k : {1, 2})
       if (std::abs(normal[k]) > std::abs(normal[axis])) axis = k;
-    int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    if (normal[axis] < 0) std::swap(u, v);
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const bool isFlipped = area[axis] < 0;
     points_.clear();
     for (const std::uint32_t vertex : vertices_) {
       const Vec3d& p = splitter_.position(vertex);

@@ -101,9 +101,11 @@ Mesh triangulated(const Mesh& mesh) {
     }
     result.attributes.push_back(std::move(copy));
   }
+  result.materialFiles = mesh.materialFiles;
   for (const MeshGroup& group : mesh.groups) {
     const std::uint32_t first = firstTriangle[group.firstFace];
-    result.groups.push_back({group.name, first, firstTriangle[group.firstFace + group.faceCount] - first});
+    result.groups.push_back(
+        {group.name, first, firstTriangle[group.firstFace + group.faceCount] - first, group.material});
   }
   return result;
 }

@@ -25,6 +25,8 @@ struct MeshGroup {
   std::string name;
   std::uint32_t firstFace = 0;
   std::uint32_t faceCount = 0;
+  /// What its faces are made of, by name; empty: not said.
+  std::string material{};
 };
 
 /// A plain indexed polygon mesh; any soup fits. World units, right-handed, counter-clockwise front faces.
@@ -36,6 +38,8 @@ struct Mesh {
   std::vector<std::uint32_t> faceStart{0};
   std::vector<MeshAttribute> attributes;
   std::vector<MeshGroup> groups;
+  /// Where the materials of groups are described: paths of .mtl files, which need not exist.
+  std::vector<std::string> materialFiles{};
 
   std::size_t faceCount() const { return faceStart.size() - 1; }
   std::span<const std::uint32_t> face(std::size_t f) const {

@@ -1,83 +1,214 @@
-// Cutting a level set into pieces, per knife, and what the level set costs by itself: a torus of 65 536
-// triangles at 256 voxels along its longest side.
+// Cutting into pieces, as level sets and exactly, by number of knives; the same exact Voronoi cells by clips
+// with CGAL; and what the level set costs by itself. The bunny of the shared data where it is, else a torus
+// of 65 536 triangles, at 256 voxels along its longest side.
 
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
 
 #include "levelset/grid_field.h"
+#include "levelset/mesh_io.h"
 #include "levelset/mesh_pieces.h"
 #include "levelset/mesh_to_level_set.h"
 #include "levelset/pieces.h"
+#include "tests/bench/corefined_cells.h"
 #include "tests/support/test_meshes.h"
 
 namespace nephele {
 namespace {
 
-const Mesh& torus() {
-  static const Mesh mesh = test::torusMesh(1, 0.4, 256, 128);
+const Mesh& source() {
+  static const Mesh mesh = [] {
+    const auto path =
+        std::filesystem::path(NEPHELE_SOURCE_DIR).parent_path() / "shared/data/meshes/bunny_60k.obj";
+    return std::filesystem::exists(path) ? triangulated(readMesh(path.string()))
+                                         : test::torusMesh(1, 0.4, 256, 128);
+  }();
   return mesh;
 }
 
-constexpr float kVoxel = 2.8f / 256;
+Box box() {
+  return boundingBox(source());
+}
+
+float voxel() {
+  const Vec3f size = box().size();
+  return std::max({size.x, size.y, size.z}) / 256;
+}
+
+std::vector<BladePlane> blades(std::int64_t count) {
+  return randomBlades({.count = int(count), .box = box(), .seed = 1});
+}
+
+const ScalarField& level() {
+  static const ScalarField field =
+      gridField(toBricks(meshToLevelSet(source(), {.voxelSize = double(voxel())})));
+  return field;
+}
 
 void levelSet(benchmark::State& state) {
   for (auto _ : state)
-    benchmark::DoNotOptimize(&meshToLevelSet(torus(), {.voxelSize = double(kVoxel)}).impl());
+    benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl());
 }
 
-void cut(benchmark::State& state, CutOptions options) {
-  const ScalarField level = gridField(toBricks(meshToLevelSet(torus(), {.voxelSize = double(kVoxel)})));
+void cut(benchmark::State& state, const CutOptions& options) {
+  level();
   Pieces pieces;
-  for (auto _ : state) pieces = cutIntoPieces(level, options);
-  state.SetLabel(std::to_string(pieces.pieces.size()) + " pieces of " + std::to_string(pieces.codes) +
-                 " codes");
+  for (auto _ : state) pieces = cutIntoPieces(level(), options);
+  state.SetItemsProcessed(state.iterations() * std::int64_t(pieces.pieces.size()));
+  state.counters["pieces"] = double(pieces.pieces.size());
+  state.SetLabel(fmt::format("{} pieces of {} codes", pieces.pieces.size(), pieces.codes));
 }
 
 CutOptions options() {
-  return {.voxelSize = kVoxel, .box = boundingBox(torus())};
+  return {.voxelSize = voxel(), .box = box()};
 }
 
 void planes(benchmark::State& state) {
   CutOptions all = options();
-  for (const BladePlane& blade : randomBlades({.count = int(state.range(0)), .box = all.box, .seed = 1}))
-    all.knives.push_back(flatKnife(blade));
+  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
   cut(state, all);
+}
+
+RoughnessOptions roughness() {
+  const float size = length(box().size());
+  return {.amplitude = 0.01f * size, .noise = {.frequency = 4 / size}};
 }
 
 void roughPlanes(benchmark::State& state) {
   CutOptions all = options();
-  for (const BladePlane& blade : randomBlades({.count = int(state.range(0)), .box = all.box, .seed = 1}))
-    all.knives.push_back(roughKnife(blade, {.amplitude = 0.02f, .noise = {.frequency = 2}}));
+  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(roughKnife(blade, roughness()));
   cut(state, all);
+}
+
+std::vector<Vec3f> scattered(std::int64_t count) {
+  return scatteredPoints(ScalarField(1), box(), int(count), 1);
 }
 
 void cells(benchmark::State& state) {
   CutOptions all = options();
-  all.cells = scatteredPoints(ScalarField(1), all.box, int(state.range(0)), 1);
+  all.cells = scattered(state.range(0));
   cut(state, all);
 }
 
 void exactCut(benchmark::State& state, const MeshCutOptions& options) {
   MeshPieces pieces;
-  for (auto _ : state) pieces = cutMesh(torus(), options);
+  for (auto _ : state) pieces = cutMesh(source(), options);
   state.SetItemsProcessed(state.iterations() * std::int64_t(pieces.pieces.size()));
-  state.SetLabel(std::to_string(pieces.pieces.size()) + " pieces");
+  state.counters["pieces"] = double(pieces.pieces.size());
+  state.SetLabel(fmt::format("{} pieces", pieces.pieces.size()));
 }
 
 void exactPlanes(benchmark::State& state) {
+  exactCut(state, {.planes = blades(state.range(0))});
+}
+
+void exactRough(benchmark::State& state) {
+  MeshCutOptions options;
+  for (const BladePlane& blade : blades(state.range(0))) options.rough.push_back({blade, roughness()});
+  exactCut(state, options);
+}
+
+void exactBall(benchmark::State& state) {
   exactCut(state,
-           {.planes = randomBlades({.count = int(state.range(0)), .box = boundingBox(torus()), .seed = 1})});
+           {.solids = {test::icosphere(0.2 * double(length(box().size())), 5, Vec3d(box().center()))}});
 }
 
 void exactCells(benchmark::State& state) {
-  exactCut(state, {.cells = scatteredPoints(ScalarField(1), boundingBox(torus()), int(state.range(0)), 1)});
+  exactCut(state, {.cells = scattered(state.range(0))});
+}
+
+double secondsOf(const auto& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// One cell in ten by clips, in turn with all cells at once.
+void corefinedCells(benchmark::State& state) {
+  const std::vector<Vec3f> points = scattered(state.range(0));
+  const CorefinedCells baseline(source());
+  std::vector<double> ratios;
+  double apart = 0;
+  std::int64_t done = 0;
+  for (auto _ : state) {
+    MeshPieces pieces;
+    const double ours = secondsOf([&] { pieces = cutMesh(source(), {.cells = points}); });
+    std::vector<double> volumes(points.size());
+    for (const MeshPiece& piece : pieces.pieces) volumes[*piece.cell] += piece.mass.volume;
+    std::int64_t used = 0, clipped = 0;
+    double theirs = 0;
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+      if (volumes[i] == 0 || used++ % 10 != 0) continue;
+      double volume = 0;
+      theirs += secondsOf([&] { volume = baseline.volumeOf(points, i); });
+      apart = std::max(apart, std::abs(volume / volumes[i] - 1));
+      ++clipped;
+    }
+    done += clipped;
+    state.SetIterationTime(theirs);
+    ratios.push_back(theirs / double(clipped) / (ours / double(used)));
+  }
+  std::sort(ratios.begin(), ratios.end());
+  state.SetItemsProcessed(done);
+  state.SetLabel(fmt::format("{:.0f} times as long per cell as exactCells; volumes differ by {:.0e}",
+                             ratios[ratios.size() / 2], apart));
+}
+
+/// Splitting in turn with making the level set.
+void splitAgainstLevelSet(benchmark::State& state) {
+  CutOptions all = options();
+  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
+  level();
+  std::vector<double> ratios;
+  for (auto _ : state) {
+    const double made = secondsOf(
+        [&] { benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl()); });
+    const double split = secondsOf([&] { cutIntoPieces(level(), all); });
+    state.SetIterationTime(split);
+    ratios.push_back(split / made);
+  }
+  std::sort(ratios.begin(), ratios.end());
+  state.SetLabel(
+      fmt::format("{:.2f} times the level set, pieces written, with volumes", ratios[ratios.size() / 2]));
 }
 
 BENCHMARK(levelSet)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(planes)->Arg(1)->Arg(5)->Arg(20)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(planes)
+    ->Arg(1)
+    ->Arg(2)
+    ->Arg(5)
+    ->Arg(10)
+    ->Arg(15)
+    ->Arg(20)
+    ->Arg(30)
+    ->Arg(40)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK(roughPlanes)->Arg(5)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(cells)->Arg(12)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(exactPlanes)->Arg(1)->Arg(5)->Arg(20)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(exactCells)->Arg(12)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(exactPlanes)
+    ->Arg(1)
+    ->Arg(2)
+    ->Arg(5)
+    ->Arg(10)
+    ->Arg(15)
+    ->Arg(20)
+    ->Arg(30)
+    ->Arg(40)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+BENCHMARK(exactRough)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(exactBall)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(exactCells)->Arg(12)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(corefinedCells)->Arg(100)->Unit(benchmark::kMillisecond)->UseManualTime();
+BENCHMARK(splitAgainstLevelSet)->Arg(20)->Unit(benchmark::kMillisecond)->UseManualTime();
 
 }  // namespace
 }  // namespace nephele

@@ -6,66 +6,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "levelset/mesh_io.h"
 #include "levelset/mesh_repair.h"
 #include "modeling/error.h"
 #include "tests/support/mesh_topology.h"
+#include "tests/support/piece_checks.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"
 
 namespace nephele::test {
 namespace {
-
-double volumeSum(const MeshPieces& cut) {
-  double sum = cut.sliverVolume;
-  for (const MeshPiece& piece : cut.pieces) sum += piece.mass.volume;
-  return sum;
-}
-
-double faceArea(const Mesh& mesh, std::size_t f) {
-  const auto v = mesh.face(f);
-  const Vec3d &a = mesh.positions[v[0]], &b = mesh.positions[v[1]], &c = mesh.positions[v[2]];
-  return length(cross(b - a, c - a)) / 2;
-}
-
-/// First face of the group `inside`; the number of faces if there is none.
-std::size_t firstInside(const Mesh& mesh) {
-  return !mesh.groups.empty() && mesh.groups.back().name == "inside" ? mesh.groups.back().firstFace
-                                                                     : mesh.faceCount();
-}
-
-double insideArea(const Mesh& mesh) {
-  double area = 0;
-  for (std::size_t f = firstInside(mesh); f < mesh.faceCount(); ++f) area += faceArea(mesh, f);
-  return area;
-}
-
-const MeshAttribute& attributeOf(const Mesh& mesh, const std::string& name) {
-  const auto found = std::find_if(mesh.attributes.begin(), mesh.attributes.end(),
-                                  [&](const MeshAttribute& a) { return a.name == name; });
-  if (found == mesh.attributes.end()) throw Error("no attribute " + name);
-  return *found;
-}
-
-/// Closed manifold pieces facing outwards, of the volume of the source together, whose inner faces each lie
-/// on one of another piece, point by point.
-void expectSound(const Mesh& source, const MeshPieces& cut) {
-  double inside = 0, contact = 0;
-  for (const MeshPiece& piece : cut.pieces) {
-    EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold()) << topologyOf(piece.mesh);
-    EXPECT_GT(piece.mass.volume, 0);
-    EXPECT_NEAR(signedVolume(piece.mesh), piece.mass.volume, 1e-9 * signedVolume(source));
-    inside += insideArea(piece.mesh);
-    for (const PieceContact& neighbour : piece.neighbours) contact += neighbour.area;
-  }
-  // The bar of an exact cut; rounding alone is some 1e-14.
-  EXPECT_NEAR(volumeSum(cut) / signedVolume(source), 1, 1e-8);
-  if (cut.slivers == 0) {
-    EXPECT_NEAR(contact, inside, 1e-9 * (1 + inside));
-  }
-}
 
 Mesh cube() {
   return boxMesh({-1, -1, -1}, {1, 1, 1});
@@ -288,48 +239,10 @@ TEST(MeshPieces, OuterFacesKeepTheirTextureCoordinates) {
   const std::string path = sharedData("meshes/spot_uv.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const Mesh spot = triangulated(readMesh(path));
-  const MeshAttribute& sourceUv = attributeOf(spot, "uv");
   const MeshPieces cut = cutMesh(spot, {.planes = randomBlades({.count = 5, .box = boundingBox(spot)})});
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> unit(0.05, 0.9);
   std::size_t checked = 0;
-  double worst = 0;
-  for (const MeshPiece& piece : cut.pieces) {
-    const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
-    for (std::size_t f = random() % 4; f < firstInside(piece.mesh); f += 4) {
-      double w[3] = {unit(random), unit(random), unit(random)};
-      const double sum = w[0] + w[1] + w[2];
-      Vec3d p{};
-      double u[2] = {0, 0};
-      for (std::size_t k = 0; k < 3; ++k) {
-        w[k] /= sum;
-        p += piece.mesh.positions[piece.mesh.face(f)[k]] * w[k];
-        for (std::size_t i = 0; i < 2; ++i) u[i] += w[k] * double(uv.values[2 * (3 * f + k) + i]);
-      }
-      // Of all triangles of the source that hold the point, the one that agrees best.
-      double best = 1;
-      for (std::size_t t = 0; t < spot.faceCount(); ++t) {
-        const auto v = spot.face(t);
-        const Vec3d &a = spot.positions[v[0]], &b = spot.positions[v[1]], &c = spot.positions[v[2]];
-        if (std::abs(p.x - a.x) > 0.2 || std::abs(p.y - a.y) > 0.2 || std::abs(p.z - a.z) > 0.2) continue;
-        const Vec3d n = cross(b - a, c - a);
-        const double area = dot(n, n);
-        if (std::abs(dot(n, p - a)) > 1e-9 * std::sqrt(area)) continue;
-        const double wb = dot(n, cross(p - a, c - a)) / area, wc = dot(n, cross(b - a, p - a)) / area;
-        if (wb < -1e-7 || wc < -1e-7 || wb + wc > 1 + 1e-7) continue;
-        double error = 0;
-        for (std::size_t i = 0; i < 2; ++i) {
-          const auto at = [&](std::size_t k) { return double(sourceUv.values[2 * (3 * t + k) + i]); };
-          error = std::max(error, std::abs((1 - wb - wc) * at(0) + wb * at(1) + wc * at(2) - u[i]));
-        }
-        best = std::min(best, error);
-      }
-      worst = std::max(worst, best);
-      ++checked;
-    }
-  }
+  EXPECT_LT(worstTexture(spot, cut, 4, checked), 1e-5);
   EXPECT_GT(checked, 1000u);
-  EXPECT_LT(worst, 1e-5);
 }
 
 TEST(MeshPieces, InnerFacesMeasureTheKnifeInWorldUnits) {
