@@ -177,33 +177,16 @@ void splitAgainstLevelSet(benchmark::State& state) {
       fmt::format("{:.2f} times the level set, pieces written, with volumes", ratios[ratios.size() / 2]));
 }
 
+void planeCounts(benchmark::internal::Benchmark* bench) {
+  for (const int count : {1, 2, 5, 10, 15, 20, 30, 40}) bench->Arg(count);
+  bench->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+}
+
 BENCHMARK(levelSet)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(planes)
-    ->Arg(1)
-    ->Arg(2)
-    ->Arg(5)
-    ->Arg(10)
-    ->Arg(15)
-    ->Arg(20)
-    ->Arg(30)
-    ->Arg(40)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
+BENCHMARK(planes)->Apply(planeCounts);
 BENCHMARK(roughPlanes)->Arg(5)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(cells)->Arg(12)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(exactPlanes)
-    ->Arg(1)
-    ->Arg(2)
-    ->Arg(5)
-    ->Arg(10)
-    ->Arg(15)
-    ->Arg(20)
-    ->Arg(30)
-    ->Arg(40)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
+BENCHMARK(exactPlanes)->Apply(planeCounts);
 BENCHMARK(exactRough)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(exactBall)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(exactCells)->Arg(12)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond)->UseRealTime();
