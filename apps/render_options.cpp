@@ -79,6 +79,9 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   addCount(app, "--samples", options.render.samples, 1, 4096, "Rays per pixel.")
       ->each([&options](const std::string&) { options.samplesGiven = true; })
       ->default_str("4, or 64 with depth of field or motion blur");
+  addNumber(
+      app, "--adaptive", options.adaptiveThreshold, 0, 1,
+      "March only pixels whose neighbours differ by more than this share of brightness or opacity; 0: all.");
   addIntegrator(app, options);
   addCount(app, "--seed", options.seed, 0, 1 << 30, "Moves the pattern of the samples.");
   std::vector<std::string> layers = Film::layerNames();
@@ -110,9 +113,12 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
 
 PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
   PictureOptions result = *this;
-  result.extinction = extinction.value_or(defaultExtinction(volume));
+  result.extinction = extinction ? *extinction : defaultExtinction(volume);
   result.medium.extinction = *result.extinction;
   if (step.value > 0) result.render.step = float(step.worldUnits(double(volume.worldBounds().longestSide())));
+  if (adaptiveThreshold > 0 && pathTraced)
+    refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
+  result.render.adaptiveThreshold = float(adaptiveThreshold);
   result.lights = light.resolved();
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);

@@ -24,6 +24,7 @@ struct PictureOptions : CameraOptions {
   /// Of the volume if not given, see defaultExtinction.
   std::optional<float> extinction;
   Length step;
+  double adaptiveThreshold = 0;
   RenderOptions render;
   bool samplesGiven = false;
   int seed = 0;

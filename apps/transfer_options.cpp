@@ -34,9 +34,9 @@ void addPictures(CLI::App& app, TransferArguments& a) {
 
 /// Whether the format of `path` can hold `attribute`, once it is carried.
 bool holds(const std::string& path, const MeshAttribute& attribute) {
-  if (attribute.name == "uv" && attribute.width == 2) return true;
-  if (attribute.domain != MeshAttribute::Domain::vertex) return false;
-  return path.ends_with(".ply") || (attribute.name == "color" && attribute.width >= 3);
+  if (path.ends_with(".ply") || (attribute.name == "uv" && attribute.width == 2)) return true;
+  return attribute.domain == MeshAttribute::Domain::vertex && attribute.name == "color" &&
+         attribute.width >= 3;
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -75,8 +75,7 @@ TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& obj
                                 all.empty() ? "none" : listed(all)));
       if (!holds(output, *found))
         throw Error(
-            fmt::format("{}: cannot hold '{}': .obj holds uv and color, .ply these and what vertices "
-                        "carry",
+            fmt::format("{}: cannot hold '{}': .obj holds uv and the color of vertices, .ply every attribute",
                         output, name));
       if (name == "uv" && !bakedTexture.empty())
         throw Error(
@@ -88,7 +87,7 @@ TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& obj
       refuseValue("--attributes", listed(transfer.names), "a list with uv, which --preview shows");
     return transfer;
   }
-  if (!other.empty()) run.note(fmt::format("{} cannot hold {}, left out", output, listed(other)));
+  if (!other.empty()) run.note(fmt::format("{} cannot hold {}, left out; a .ply can", output, listed(other)));
   if (fit.empty() && bakedTexture.empty())
     throw Error(fmt::format("{}: has no attributes that {} can hold{}", from, output,
                             all.empty() ? "" : "; it has " + listed(all)));

@@ -13,13 +13,14 @@
 // missed.
 
 #include <fmt/format.h>
-#include <sys/mman.h>
+#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
-#include <new>
 
+#include "levelset/brick_samples.h"
 #include "levelset/grid_field.h"
 #include "levelset/large_buffer.h"
 #include "modeling/constant_node.h"
@@ -29,6 +30,9 @@
 namespace nephele {
 
 namespace {
+
+using detail::BrickSamples;
+using detail::SampleStore;
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kOwn = kBrick * kBrick * kBrick;
@@ -76,39 +80,6 @@ void requireSane(const BakeOptions& options) {
   }
 }
 
-/// Floats in pages of their own, which go back to the system at once when they are given up.
-class SampleStore {
- public:
-  SampleStore() = default;
-  explicit SampleStore(std::size_t count) : bytes_(count * sizeof(float)) {
-    if (count == 0) return;
-    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (memory == MAP_FAILED) throw std::bad_alloc();
-    data_ = static_cast<float*>(memory);
-  }
-  SampleStore(SampleStore&& other) noexcept { swap(other); }
-  SampleStore& operator=(SampleStore&& other) noexcept {
-    SampleStore taken(std::move(other));
-    swap(taken);
-    return *this;
-  }
-  ~SampleStore() {
-    if (data_) munmap(data_, bytes_);
-  }
-
-  float* data() const { return data_; }
-  bool contains(const float* p) const { return p >= data_ && p < data_ + bytes_ / sizeof(float); }
-
- private:
-  void swap(SampleStore& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
-  }
-
-  float* data_ = nullptr;
-  std::size_t bytes_ = 0;
-};
-
 template <class T>
 class Baker {
  public:
@@ -122,6 +93,7 @@ class Baker {
         progress_(progress),
         margin_(options.interpolation == Interpolation::tricubic ? 1 : 0) {
     background_.fill(options.background.value_or(std::isfinite(options.band.min) ? options.band.min : 0.0f));
+    for (const float value : background_) backgroundSamples_.insert(backgroundSamples_.end(), kOwn, value);
     for (int axis = 0; axis < 3; ++axis) {
       voxels_.first[axis] = int(std::floor(double(options.box.min[axis]) / options.voxelSize));
       voxels_.last[axis] = int(std::ceil(double(options.box.max[axis]) / options.voxelSize));
@@ -136,19 +108,17 @@ class Baker {
                 positions, options.voxelSize, kMostBricks));
   }
 
-  Grids run(const NodePtr<T>& node) {
-    std::vector<Cell> cells = cellsToEvaluate(node);
-    std::vector<CellResult> results(cells.size());
-    parallelFor(
-        cells.size(), 1,
-        [&](std::size_t begin, std::size_t end) {
-          for (std::size_t i = begin; i < end; ++i) {
-            results[i] = evaluate(cells[i]);
-            cells[i].node = nullptr;
-          }
-        },
-        progress_);
+  Grids grids(const NodePtr<T>& node) {
+    std::vector<CellResult> results = evaluated(node);
     return assemble(results);
+  }
+
+  /// Of a field of numbers.
+  BrickSamples samples(const NodePtr<T>& node) {
+    std::vector<CellResult> results = evaluated(node);
+    std::stable_sort(results.begin(), results.end(),
+                     [](const CellResult& a, const CellResult& b) { return a.firstZ < b.firstZ; });
+    return withoutBorders(results);
   }
 
  private:
@@ -163,18 +133,33 @@ class Baker {
     int size;
     Values value;
   };
-  /// A brick that was evaluated: kLanes * kOwn samples.
+  /// A brick that was evaluated: kLanes * kOwn samples. Bricks of nothing but the background share theirs.
   struct Leaf {
     Vec3i brick;
-    const float* samples;
+    float* samples;
     Ranges range;
   };
   /// What one cell of the octree gave.
   struct CellResult {
+    int firstZ = 0;
     std::vector<Settled> settled;
     std::vector<Leaf> leaves;
     SampleStore samples;
   };
+  /// Room for samples that lasts from cell to cell.
+  struct Buffer {
+    std::unique_ptr<float[]> samples;
+    std::size_t size = 0;
+
+    float* of(std::size_t count) {
+      if (count > size) {
+        samples = std::make_unique_for_overwrite<float[]>(count);
+        size = count;
+      }
+      return samples.get();
+    }
+  };
+  using Buffers = tbb::enumerable_thread_specific<Buffer>;
   /// What stands at a brick position: a constant, an evaluated brick, or neither where it is not known yet.
   struct Standing {
     const Values* constant = nullptr;
@@ -283,17 +268,34 @@ class Baker {
       split(cell, [&](Cell&& part) { collect(std::move(part), bricks, settled); });
   }
 
-  CellResult evaluate(const Cell& cell) const {
+  std::vector<CellResult> evaluated(const NodePtr<T>& node) {
+    std::vector<Cell> cells = cellsToEvaluate(node);
+    std::vector<CellResult> results(cells.size());
+    Buffers buffers;
+    parallelFor(
+        cells.size(), 1,
+        [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) {
+            results[i] = evaluate(cells[i], buffers.local());
+            cells[i].node = nullptr;
+          }
+        },
+        progress_);
+    return results;
+  }
+
+  CellResult evaluate(const Cell& cell, Buffer& buffer) {
     CellResult result;
+    result.firstZ = cell.brick.z;
     std::vector<Cell> bricks;
     collect(cell, bricks, result.settled);
     if (bricks.empty()) return result;
-    const auto samples = std::make_unique_for_overwrite<float[]>(bricks.size() * kLanes * kOwn);
+    float* samples = buffer.of(bricks.size() * kLanes * kOwn);
     Scratch& scratch = Scratch::local();
     std::vector<Leaf> leaves(bricks.size());
     for (std::size_t i = 0; i < bricks.size(); ++i) {
       progress_.check();
-      float* own = samples.get() + i * kLanes * kOwn;
+      float* own = samples + i * kLanes * kOwn;
       evaluate(*bricks[i].node, bricks[i].brick, own, scratch);
       leaves[i] = {bricks[i].brick, own, {}};
       for (int c = 0; c < kLanes; ++c) leaves[i].range[c] = rangeOfSamples({own + c * kOwn, kOwn});
@@ -305,7 +307,7 @@ class Baker {
 
   /// Collapses the bricks that can be judged within their cell, and copies the others to a store of just
   /// their size.
-  void keepUnsettled(const Vec3i& cell, const std::vector<Leaf>& leaves, CellResult& result) const {
+  void keepUnsettled(const Vec3i& cell, const std::vector<Leaf>& leaves, CellResult& result) {
     std::array<Standing, kCellSize * kCellSize * kCellSize> standing{};
     const auto place = [&](const Vec3i& b) -> Standing* {
       const Vec3i d = b - cell;
@@ -328,14 +330,29 @@ class Baker {
         result.leaves.push_back(leaf);
     }
     result.settled.insert(result.settled.end(), collapsedHere.begin(), collapsedHere.end());
-    result.samples = SampleStore(result.leaves.size() * kLanes * kOwn);
+    std::size_t stored = 0;
+    for (Leaf& leaf : result.leaves) {
+      if (isBackground(leaf))
+        leaf.samples = backgroundSamples_.data();
+      else
+        ++stored;
+    }
+    result.samples = SampleStore(stored * kLanes * kOwn);
     float* to = result.samples.data();
     for (Leaf& leaf : result.leaves) {
+      if (isShared(leaf)) continue;
       std::copy_n(leaf.samples, kLanes * kOwn, to);
       leaf.samples = to;
       to += kLanes * kOwn;
     }
   }
+
+  bool isBackground(const Leaf& leaf) const {
+    bool is = true;
+    for (int c = 0; c < kLanes; ++c) is &= leaf.range[c] == Interval::of(background_[c]);
+    return is;
+  }
+  bool isShared(const Leaf& leaf) const { return leaf.samples == backgroundSamples_.data(); }
 
   /// The own samples of one brick, component by component.
   void evaluate(const FieldNode<T>& node, const Vec3i& brick, float* samples, Scratch& scratch) const {
@@ -445,7 +462,9 @@ class Baker {
     return ranges;
   }
 
-  Grids assemble(std::vector<CellResult>& results) {
+  /// The bricks that are no constants, in order; fills the table, for a pool in which they follow the
+  /// constants.
+  std::vector<Leaf> judged(const std::vector<CellResult>& results) {
     table_.assign(std::size_t(brickCount_.x) * brickCount_.y * brickCount_.z, 0);
     constant(background_);
     for (const Settled& s : settled_) enter(s);
@@ -479,15 +498,44 @@ class Baker {
     require(double(poolSize) < kMostBricks, "bake: too many bricks; use larger voxels");
     for (std::size_t i = 0; i < leaves.size(); ++i)
       table_[tableIndex(leaves[i].brick)] = std::int32_t(constants_.size() + i);
+    return leaves;
+  }
 
+  Grids assemble(std::vector<CellResult>& results) {
+    const std::vector<Leaf> leaves = judged(results);
     Grids grids;
-    for (int c = 0; c < kLanes; ++c) grids[c] = emptyGrid(c, poolSize);
+    for (int c = 0; c < kLanes; ++c) grids[c] = emptyGrid(c, constants_.size() + leaves.size());
     move(leaves, results, grids);
     for (int c = 0; c < kLanes; ++c) {
       grids[c]->table = c + 1 < kLanes ? table_ : std::move(table_);
       fillBorders(*grids[c]);
     }
     return grids;
+  }
+
+  BrickSamples withoutBorders(std::vector<CellResult>& results) {
+    const std::vector<Leaf> leaves = judged(results);
+    BrickSamples all;
+    all.voxelSize = options_.voxelSize;
+    all.background = background_[0];
+    all.firstBrick = firstBrick_;
+    all.brickCount = brickCount_;
+    all.table = std::move(table_);
+    SampleStore constants(constants_.size() * kOwn);
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      all.pool.push_back(constants.data() + i * kOwn);
+      std::fill_n(all.pool.back(), kOwn, constants_[i][0]);
+      all.ranges.push_back(Interval::of(constants_[i][0]));
+    }
+    all.stores.push_back({std::move(constants), std::numeric_limits<int>::max()});
+    for (const Leaf& leaf : leaves) {
+      all.placed.push_back({std::int32_t(all.pool.size()), leaf.brick});
+      all.pool.push_back(isShared(leaf) ? all.pool[0] : leaf.samples);
+      all.ranges.push_back(leaf.range[0]);
+    }
+    for (CellResult& result : results)
+      all.stores.push_back({std::move(result.samples), result.firstZ + kCellSize - 1});
+    return all;
   }
 
   /// Everything but the table and the bricks that are not constant, for which room is reserved.
@@ -521,8 +569,10 @@ class Baker {
               std::copy_n(own + row * kBrick, kBrick, brick + sampleOffset(0, row % kBrick, row / kBrick));
           }
       });
+      std::size_t next = last;
+      while (next < leaves.size() && isShared(leaves[next])) ++next;
       const auto holdsNext = [&](const CellResult& r) {
-        return last < leaves.size() && r.samples.contains(leaves[last].samples);
+        return next < leaves.size() && r.samples.contains(leaves[next].samples);
       };
       for (; cell < results.size() && !holdsNext(results[cell]); ++cell) results[cell].samples = {};
     }
@@ -533,6 +583,7 @@ class Baker {
   /// Samples beyond a cell's corners that interpolation reads.
   int margin_;
   Values background_;
+  std::vector<float> backgroundSamples_;
   VoxelBox voxels_;
   Vec3i firstBrick_, brickCount_;
   std::vector<Settled> settled_;
@@ -546,7 +597,13 @@ class Baker {
 std::shared_ptr<BrickGrid> bakeGrid(const ScalarField& field, const BakeOptions& options,
                                     const Progress& progress) {
   requireSane(options);
-  return Baker<float>(options, progress).run(field.node())[0];
+  return Baker<float>(options, progress).grids(field.node())[0];
+}
+
+BrickSamples detail::bakeSamples(const ScalarField& field, const BakeOptions& options,
+                                 const Progress& progress) {
+  requireSane(options);
+  return Baker<float>(options, progress).samples(field.node());
 }
 
 ScalarField bake(const ScalarField& field, const BakeOptions& options, const Progress& progress) {
@@ -556,7 +613,7 @@ ScalarField bake(const ScalarField& field, const BakeOptions& options, const Pro
 VectorField bake(const VectorField& field, const BakeOptions& options, const Progress& progress) {
   requireSane(options);
   require(options.band == Interval::everything(), "bake: a band has no meaning for vectors");
-  const auto grids = Baker<Vec3f>(options, progress).run(field.node());
+  const auto grids = Baker<Vec3f>(options, progress).grids(field.node());
   return gridField(VectorGrids{grids[0], grids[1], grids[2]}, options.interpolation);
 }
 

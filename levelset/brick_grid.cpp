@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "levelset/brick_samples.h"
 #include "levelset/large_buffer.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
@@ -101,12 +102,8 @@ void pack(BrickGrid& grid) {
     grid.codes.resize(last * kVolume);
     parallelFor(last - first, kBricksPerTask, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = first + begin; b < first + end; ++b) {
-        const float low = grid.ranges[b].min, width = grid.ranges[b].max - low;
-        const float scale = width > 0 ? BrickCode::kLargest / width : 0.0f;
-        const float* values = grid.values.data() + b * kVolume;
-        std::uint16_t* codes = grid.codes.data() + b * kVolume;
-        for (int i = 0; i < kVolume; ++i)
-          codes[i] = std::uint16_t(std::min((values[i] - low) * scale + 0.5f, BrickCode::kLargest));
+        detail::encodeBrick(grid.values.data() + b * kVolume, grid.ranges[b],
+                            grid.codes.data() + b * kVolume);
       }
     });
     detail::releasePages(grid.values.data() + first * kVolume, grid.values.data() + last * kVolume);

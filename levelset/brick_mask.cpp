@@ -41,6 +41,31 @@ MaskBounds boundsOf(const BrickMask& mask) {
   return bounds;
 }
 
+std::uint64_t faceOf(const BrickMask& mask, int axis, bool isLast) {
+  if (axis == 2) return mask.slices[isLast ? 7 : 0];
+  std::uint64_t face = 0;
+  for (std::size_t z = 0; z < 8; ++z) {
+    const std::uint64_t slice = mask.slices[z];
+    if (axis == 1) {
+      face |= (isLast ? slice >> 56 : slice & kRow) << (8 * z);
+    } else {
+      // Column 0: any order will do that is the same for all.
+      face |= ((isLast ? slice >> 7 : slice) & kColumn) << z;
+    }
+  }
+  return face;
+}
+
+int wholeCells(const BrickMask& mask) {
+  int count = 0;
+  for (std::size_t z = 0; z < 7; ++z) {
+    const std::uint64_t both = mask.slices[z] & mask.slices[z + 1],
+                        square = both & both >> 1 & ~(kColumn << 7);
+    count += std::popcount(square & square >> 8);
+  }
+  return count;
+}
+
 BrickMask moved(const BrickMask& mask, const Vec3i& offset) {
   BrickMask result;
   for (int z = 0; z < 8; ++z)

@@ -56,6 +56,13 @@ inline BrickMask operator|(const BrickMask& a, const BrickMask& b) {
   return m;
 }
 
+/// The samples on a face of the brick, the first or the last along an axis: one bit for each, in the same
+/// order for both.
+std::uint64_t faceOf(const BrickMask& mask, int axis, bool isLast);
+
+/// How many cells have all of their eight corners in the set.
+int wholeCells(const BrickMask& mask);
+
 /// The set moved by `offset` samples; what leaves the brick is lost.
 BrickMask moved(const BrickMask& mask, const Vec3i& offset);
 

@@ -1,8 +1,8 @@
-// Works slab by slab, each an octree from blocks of 32^3 voxels down to leaves of 8^3. A sampled estimate of
-// the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's error
-// is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum. Leaves
-// go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would hold
-// every value almost three times.
+// Works strip by strip, each an octree from blocks of 32^3 voxels down to leaves of 8^3. A sampled estimate
+// of the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's
+// error is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum.
+// Leaves go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would
+// hold every value almost three times.
 //
 // Limits: at a crease of the surface the estimate can be off by more than its stated error; the voxels
 // concerned then differ by less than an edge thickness in position.
@@ -106,31 +106,46 @@ class TreeBuilder {
     const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
     const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
     auto tree = std::make_shared<openvdb::FloatTree>(rule_.background());
-    std::vector<Block> slab(std::size_t(count.x) * std::size_t(count.y));
-    for (int z = 0; z < count.z; ++z) {
-      const Vec3i corner = first + Vec3i{0, 0, z};
-      const ScalarField estimate = sampledEstimate(corner, {count.x, count.y, 1});
-      parallelFor(slab.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t b = begin; b < end; ++b) {
-          progress.check();
-          const Vec3i block = (corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock;
-          const Box box = boxOfVoxels(block, {kBlock, kBlock, kBlock});
-          split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, slab[b]);
-        }
-      });
-      move(slab, *tree);
-      progress.advance(double(z + 1) / count.z);
+    const int width = stripWidth(), strips = (count.y + width - 1) / width;
+    for (int i = 0; i < count.z * strips; ++i) {
+      const int y = i % strips * width;
+      const Vec3i strip{count.x, std::min(width, count.y - y), 1};
+      addStrip(first + Vec3i{0, y, i / strips}, strip, *tree, progress);
+      progress.advance(double(i + 1) / (count.z * strips));
     }
     openvdb::tools::pruneTiles(*tree);
     return tree;
   }
 
  private:
+  /// Blocks along y whose estimate is sampled at a time: so many that little of it is sampled twice.
+  int stripWidth() const {
+    constexpr float kBricks = 16;
+    return std::max(
+        1, int(std::ceil(kBricks * BrickGrid::kBrick * cloud_.estimateVoxelSize / (float(kBlock) * voxel_))));
+  }
+
+  /// Adds the blocks from `corner` on.
+  void addStrip(const Vec3i& corner, const Vec3i& count, openvdb::FloatTree& tree,
+                const Progress& progress) const {
+    const ScalarField estimate = sampledEstimate(corner, count);
+    std::vector<Block> blocks(std::size_t(count.x) * std::size_t(count.y));
+    parallelFor(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b) {
+        progress.check();
+        const Vec3i block = (corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock;
+        const Box box = boxOfVoxels(block, {kBlock, kBlock, kBlock});
+        split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, blocks[b]);
+      }
+    });
+    move(blocks, tree);
+  }
+
   Box boxOfVoxels(const Vec3i& first, const Vec3i& count) const {
     return {Vec3f(first) * voxel_, Vec3f(first + count - Vec3i{1, 1, 1}) * voxel_};
   }
 
-  /// The estimate over some blocks, on a grid: one slab at a time keeps it small beside the cloud's own
+  /// The estimate over some blocks, on a grid: one strip at a time keeps it small beside the cloud's own
   /// grids.
   ScalarField sampledEstimate(const Vec3i& firstBlock, const Vec3i& blocks) const {
     const float margin = 2 * cloud_.estimateVoxelSize;
@@ -232,14 +247,13 @@ class TreeBuilder {
     block.leaves.push_back(std::move(leaf));
   }
 
-  /// Puts what `blocks` hold into `tree` and empties them.
+  /// Puts what `blocks` hold into `tree`.
   void move(std::vector<Block>& blocks, openvdb::FloatTree& tree) const {
     openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor(tree);
     for (Block& block : blocks) {
       for (const Block::Tile& tile : block.tiles)
         accessor.addTile(1, tile.origin, tile.value, rule_.isActive(tile.value));
       for (std::unique_ptr<Leaf>& leaf : block.leaves) accessor.addLeaf(leaf.release());
-      block = {};
     }
   }
 

@@ -16,8 +16,12 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <string>
+#include <utility>
 
+#include "levelset/brick_memo.h"
+#include "levelset/brick_samples.h"
 #include "levelset/grid_field.h"
 #include "levelset/large_buffer.h"
 #include "levelset/medial_smoothing.h"
@@ -30,6 +34,9 @@
 namespace nephele {
 
 namespace {
+
+using detail::BrickSamples;
+using detail::Packing;
 
 /// Samples per wave of the finest noise: of layers that others build on, of the last one, and the least.
 constexpr float kSamplesPerWave = 16;
@@ -91,6 +98,11 @@ class GrownNode final : public FieldNode<float> {
     Scratch::Frame frame(scratch);
     float* grown = frame.lane();
     displacement_->eval(points, {grown}, scratch);
+    if (before_ == level_) {
+      level_->eval(points, values, scratch);
+      for (int i = 0; i < points.count; ++i) values[0][i] += std::abs(grown[i]);
+      return;
+    }
     const BlockLanes<3> where = frame.lanes<3>();
     std::array<std::uint8_t, kBlockSize> origin;
     int count = 0;
@@ -188,23 +200,24 @@ struct Parts {
   }
 };
 
-/// An empty grid for displacements at the bricks of `slab` inside a box.
-std::shared_ptr<BrickGrid> emptyGrid(const Box& box, float voxelSize, const Slab& slab) {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->voxelSize = voxelSize;
-  grid->indexToWorld.linear = Mat3f::scaling(voxelSize);
-  grid->worldToIndex.linear = Mat3f::scaling(1.0f / voxelSize);
+/// The layout of a layer's grid at the bricks of `slab` inside a box, without bricks.
+BrickSamples noSamples(const Box& box, float voxelSize, const Slab& slab) {
+  BrickSamples samples;
+  samples.voxelSize = voxelSize;
   for (int axis = 0; axis < 3; ++axis) {
-    grid->firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-    grid->brickCount[axis] =
-        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - grid->firstBrick[axis];
+    samples.firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+    samples.brickCount[axis] =
+        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.firstBrick[axis];
   }
-  grid->firstBrick.z = slab.begin;
-  grid->brickCount.z = slab.end - slab.begin;
-  const Vec3i n = grid->brickCount;
-  grid->table.resize(std::size_t(n.x) * n.y * n.z);
-  grid->ranges.push_back(Interval::of(0));
-  return grid;
+  samples.firstBrick.z = slab.begin;
+  samples.brickCount.z = slab.end - slab.begin;
+  const Vec3i n = samples.brickCount;
+  samples.table.resize(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+  detail::SampleStore background(BrickSamples::kCount);
+  samples.pool.push_back(background.data());
+  samples.ranges.push_back(Interval::of(0));
+  samples.stores.push_back({std::move(background), std::numeric_limits<int>::max()});
+  return samples;
 }
 
 /// `reach` is how far smoothing sees, in voxels.
@@ -224,53 +237,43 @@ Parts partsOf(const Box& box, float voxelSize, int reach) {
 /// A slab of a layer as it was sampled, with samples beside it that are of no use.
 struct Part {
   Slab slab;
-  std::shared_ptr<BrickGrid> grid;
+  BrickSamples samples;
 };
 
-/// The bricks of `slab` from those of neighbouring parts, each at a place of its own, with borders. May be
-/// the grid of a part that needs no other.
-std::shared_ptr<BrickGrid> windowOf(const std::deque<Part>& parts, const Slab& slab, const Box& box,
-                                    float voxelSize) {
-  constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
-  if (parts.size() == 1 && placedBricks(*parts[0].grid).size() + 1 == parts[0].grid->poolSize())
-    return parts[0].grid;
-  std::shared_ptr<BrickGrid> window = emptyGrid(box, voxelSize, slab);
-  std::vector<const float*> sources{nullptr};
-  for (const Part& part : parts) {
-    const Vec3i first = max(window->firstBrick, part.grid->firstBrick);
-    const Vec3i end =
-        min(window->firstBrick + window->brickCount, part.grid->firstBrick + part.grid->brickCount);
-    Vec3i b;
-    for (b.z = std::max(first.z, part.slab.begin); b.z < std::min(end.z, part.slab.end); ++b.z)
-      for (b.y = first.y; b.y < end.y; ++b.y)
-        for (b.x = first.x; b.x < end.x; ++b.x) {
-          const std::int32_t pool = part.grid->poolIndex(b);
-          if (pool == 0) continue;
-          window->table[window->tableIndex(b)] = std::int32_t(sources.size());
-          sources.push_back(part.grid->brick(pool));
-        }
+/// Copies of the bricks of `slab` from those of neighbouring parts.
+BrickSamples windowOf(const std::deque<Part>& parts, const Slab& slab, const Box& box, float voxelSize) {
+  /// Bricks along z that are given back together.
+  constexpr int kStoreBricks = 8;
+  BrickSamples window = noSamples(box, voxelSize, slab);
+  for (int z = slab.begin; z < slab.end; z += kStoreBricks) {
+    std::vector<Vec3i> bricks;
+    std::vector<const float*> sources;
+    for (const Part& part : parts) {
+      const Vec3i first = max(window.firstBrick, part.samples.firstBrick);
+      const Vec3i end =
+          min(window.firstBrick + window.brickCount, part.samples.firstBrick + part.samples.brickCount);
+      const int lastZ = std::min({z + kStoreBricks, end.z, part.slab.end});
+      Vec3i b;
+      for (b.z = std::max({z, first.z, part.slab.begin}); b.z < lastZ; ++b.z)
+        for (b.y = first.y; b.y < end.y; ++b.y)
+          for (b.x = first.x; b.x < end.x; ++b.x) {
+            const std::int32_t pool = part.samples.poolIndex(b);
+            if (pool == 0) continue;
+            bricks.push_back(b);
+            sources.push_back(part.samples.pool[std::size_t(pool)]);
+          }
+    }
+    const std::size_t before = window.pool.size();
+    window.append(bricks);
+    parallelFor(bricks.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        float* copy = window.pool[before + i];
+        std::copy_n(sources[i], BrickSamples::kCount, copy);
+        window.ranges[before + i] = rangeOfSamples({copy, std::size_t(BrickSamples::kCount)});
+      }
+    });
   }
-  detail::reserveLarge(window->values, sources.size() * kVolume);
-  window->values.resize(kVolume);
-  for (std::size_t i = 1; i < sources.size(); ++i)
-    window->values.insert(window->values.end(), sources[i], sources[i] + kVolume);
-  window->ranges.resize(sources.size(), Interval::of(0));
-  fillBorders(*window);
   return window;
-}
-
-/// Appends chosen bricks of a packed grid to a packed grid.
-void append(BrickGrid& grid, const BrickGrid& part, const std::vector<bool>& chosen) {
-  constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
-  const auto count = std::size_t(std::count(chosen.begin(), chosen.end(), true));
-  detail::resizeLarge(grid.codes, (grid.poolSize() + count) * kVolume);
-  for (const PlacedBrick& brick : placedBricks(part)) {
-    const auto pool = std::size_t(brick.pool);
-    if (!chosen[pool]) continue;
-    grid.table[grid.tableIndex(brick.brick)] = std::int32_t(grid.poolSize());
-    std::copy_n(part.codes.data() + pool * kVolume, kVolume, grid.codes.data() + grid.poolSize() * kVolume);
-    grid.ranges.push_back(part.ranges[pool]);
-  }
 }
 
 /// Work that is a part of a stage: from one share of it to another.
@@ -312,15 +315,14 @@ class LayerSampler {
   float estimateVoxelSize = 0;
 
  private:
-  /// The layer's grid, packed. Made in parts along z, since samples take twice the memory until they are
-  /// packed. A part is smoothed together with as much of its neighbours as can reach it: the parts do not
-  /// show.
+  /// The layer's grid, packed. A large one is made in parts along z, since samples take more memory until
+  /// they are packed. A part is smoothed together with as much of its neighbours as can reach it: the parts
+  /// do not show.
   std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
     const Box box = options_.box.expanded(reach_ + step.margin);
     const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
     const Parts cut = partsOf(box, voxel, smoothing.dilation + smoothing.steps);
-    std::shared_ptr<BrickGrid> layer = emptyGrid(box, voxel, cut.all);
-    layer->codes.resize(BrickGrid::kVolume);
+    const std::shared_ptr<BrickGrid> layer = detail::emptyPackedGrid(noSamples(box, voxel, cut.all));
     const ScalarField needed =
         NeededNode::isOfUse(step, layers_)
             ? ScalarField(std::make_shared<NeededNode>(step, layers_, options_.voxelSize))
@@ -331,35 +333,46 @@ class LayerSampler {
       const ShareOfProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
       parts.push_back({cut[part], bakeSlab(needed, cut[part], box, voxel, share)});
     };
+    // The only part, or a part with what is around it.
+    const auto takeWindow = [&](int part) {
+      if (count > 1) return windowOf(parts, cut.around(part), box, voxel);
+      BrickSamples all = std::move(parts[0].samples);
+      all.separate();
+      return all;
+    };
     Count total;
     bakePart(0);
     for (int part = 0; part < count; ++part) {
       if (part + 1 < count) bakePart(part + 1);
-      const auto window = windowOf(parts, cut.around(part), box, voxel);
+      BrickSamples window = takeWindow(part);
       // The next window needs the end of this part and all of the next one.
       while (parts.size() > (part + 1 < count ? 2 : 0)) parts.pop_front();
       detail::releaseFreed();
       const double done = kShareOfBake * std::min(part + 2, count) / count;
-      if (step.bound > 0) smoothMedialJumps(*window, smoothing, ShareOfProgress(progress_, done, done));
-      const std::vector<bool> matters = judged(step, *window, cut[part], total);
-      pack(*window);
-      append(*layer, *window, matters);
+      MedialSmoothing smooth{0, std::vector<bool>(window.pool.size())};
+      if (step.bound > 0)
+        smooth = smoothMedialJumps(window, smoothing, ShareOfProgress(progress_, done, done));
+      std::vector<Packing> packing = judged(step, window, cut[part], total);
+      for (std::size_t b = 0; b < packing.size(); ++b)
+        if (packing[b] == Packing::whole && smooth.signless[b]) packing[b] = Packing::absolute;
+      detail::appendPacked(*layer, std::move(window), packing);
     }
     report(step, total, voxel);
     return layer;
   }
 
   /// The samples of the bricks of a slab.
-  std::shared_ptr<BrickGrid> bakeSlab(const ScalarField& displacement, const Slab& slab, const Box& box,
-                                      float voxel, const Progress& progress) const {
+  BrickSamples bakeSlab(const ScalarField& displacement, const Slab& slab, const Box& box, float voxel,
+                        const Progress& progress) const {
     // All that interpolation in the slab's bricks reads, so that bricks are kept or dropped as in one piece.
     const float first = float(slab.begin * BrickGrid::kBrick - BrickGrid::kBefore) + 0.5f;
     const float last = float(slab.end * BrickGrid::kBrick - 1 + BrickGrid::kAfter) - 0.5f;
     const Box around{{box.min.x, box.min.y, first * voxel}, {box.max.x, box.max.y, last * voxel}};
     const Box inside = box.intersection(around);
-    if (inside.isEmpty()) return emptyGrid(box, voxel, slab);
-    return bakeGrid(displacement,
-                    {.voxelSize = voxel, .box = inside, .interpolation = Interpolation::tricubic}, progress);
+    if (inside.isEmpty()) return noSamples(box, voxel, slab);
+    return detail::bakeSamples(displacement,
+                               {.voxelSize = voxel, .box = inside, .interpolation = Interpolation::tricubic},
+                               progress);
   }
 
   int dilation(float voxel) const {
@@ -392,33 +405,40 @@ class LayerSampler {
       return;
     }
     // At the grid's own voxels trilinear interpolation gives the samples.
-    level_ = bakeGrid(ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))),
-                      spec, ShareOfProgress(progress_, kShareOfBake, 1));
-    pack(*level_);
+    level_ = detail::packed(detail::bakeSamples(
+        ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))), spec,
+        ShareOfProgress(progress_, kShareOfBake, 1)));
     sampled.level = gridField(level_);
     sampled.surface = gridField(level_, Interpolation::tricubic);
   }
 
-  /// The samples of one brick at which the layer was evaluated.
+  /// The samples of one brick. Where the displacement is 0 the layer was not evaluated.
   struct Samples {
     std::array<float, kBrickSamples> x, y, z, displacement;
-    std::size_t count = 0;
 
-    Samples(const BrickGrid& grid, const PlacedBrick& brick) {
-      const float* stored = grid.brick(brick.pool);
+    Samples(const BrickSamples& samples, const PlacedBrick& brick) {
+      const float* own = samples.pool[std::size_t(brick.pool)];
       for (int s = 0; s < kBrickSamples; ++s) {
         const Vec3i at{s & 7, s >> 3 & 7, s >> 6};
-        const float value = stored[sampleOffset(at.x, at.y, at.z)];
-        if (value == 0) continue;
-        const Vec3f p = grid.indexToWorld(Vec3f(brick.brick * BrickGrid::kBrick + at));
-        x[count] = p.x;
-        y[count] = p.y;
-        z[count] = p.z;
-        displacement[count++] = std::abs(value);
+        const Vec3f p = Vec3f(brick.brick * BrickGrid::kBrick + at) * samples.voxelSize;
+        x[std::size_t(s)] = p.x;
+        y[std::size_t(s)] = p.y;
+        z[std::size_t(s)] = p.z;
+        displacement[std::size_t(s)] = std::abs(own[s]);
       }
     }
-    PointSpans points() const {
-      return {std::span(x).first(count), std::span(y).first(count), std::span(z).first(count)};
+    PointSpans points() const { return {x, y, z}; }
+    /// Moves the samples at which the layer was evaluated to the front and returns their number.
+    std::size_t keepEvaluated() {
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < kBrickSamples; ++i) {
+        if (displacement[i] == 0) continue;
+        x[count] = x[i];
+        y[count] = y[i];
+        z[count] = z[i];
+        displacement[count++] = displacement[i];
+      }
+      return count;
     }
   };
 
@@ -437,11 +457,11 @@ class LayerSampler {
     }
   };
 
-  /// Adds what the part of a layer inside `slab` comes to, and says of every brick of the pool whether it
-  /// matters: whether its sums are such that the layers after this one can bring them to the surface.
-  std::vector<bool> judged(const CumuloStep& step, const BrickGrid& grid, const Slab& slab,
-                           Count& total) const {
-    std::vector<PlacedBrick> bricks = placedBricks(grid);
+  /// Adds what the part of a layer inside `slab` comes to, and leaves out the bricks that do not matter:
+  /// keeps those whose sums are such that the layers after this one can bring them to the surface.
+  std::vector<Packing> judged(const CumuloStep& step, const BrickSamples& part, const Slab& slab,
+                              Count& total) const {
+    std::vector<PlacedBrick> bricks = part.placed;
     std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
     const std::size_t stride = std::max(kLeastStride, bricks.size() / kSearchedBricks);
     const VectorField foot =
@@ -452,23 +472,26 @@ class LayerSampler {
     parallelFor(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
       std::array<float, kBrickSamples> level;
       for (std::size_t b = begin; b < end; ++b) {
-        const Samples samples(grid, bricks[b]);
-        counts[b].active = samples.count;
-        if (samples.count == 0) continue;
-        step.level.eval(samples.points(), std::span(level).first(samples.count));
-        for (std::size_t i = 0; i < samples.count; ++i) {
+        // Wholly outside the band.
+        if (part.ranges[std::size_t(bricks[b].pool)] == Interval::of(0)) continue;
+        Samples samples(part, bricks[b]);
+        // All of a brick, though not all matter: in blocks that are known from the bake.
+        step.level.eval(samples.points(), std::span<float>(level));
+        for (std::size_t i = 0; i < kBrickSamples; ++i) {
+          if (samples.displacement[i] == 0) continue;
+          ++counts[b].active;
           matters[b] |= level[i] + samples.displacement[i] >= least;
-          if (!(std::abs(level[i]) <= grid.voxelSize)) continue;
+          if (!(std::abs(level[i]) <= part.voxelSize)) continue;
           counts[b].displacement += samples.displacement[i];
           ++counts[b].near;
         }
         if (b % stride == 0) countMissed(step, foot, samples, counts[b]);
       }
     });
-    std::vector<bool> result(grid.poolSize());
+    std::vector<Packing> result(part.pool.size(), Packing::leaveOut);
     for (std::size_t b = 0; b < bricks.size(); ++b) {
       total += counts[b];
-      result[std::size_t(bricks[b].pool)] = matters[b] != 0;
+      if (matters[b]) result[std::size_t(bricks[b].pool)] = Packing::whole;
     }
     return result;
   }
@@ -485,14 +508,13 @@ class LayerSampler {
   }
 
   /// The points whose surface point is not on the surface.
-  void countMissed(const CumuloStep& step, const VectorField& foot, const Samples& samples,
-                   Count& count) const {
+  void countMissed(const CumuloStep& step, const VectorField& foot, Samples& samples, Count& count) const {
     std::array<float, kBrickSamples> x, y, z, residual;
-    const std::size_t n = samples.count;
-    foot.eval(samples.points(),
-              Spans<3>{{std::span(x).first(n), std::span(y).first(n), std::span(z).first(n)}});
-    step.surface.eval({std::span(x).first(n), std::span(y).first(n), std::span(z).first(n)},
-                      std::span(residual).first(n));
+    const std::size_t n = samples.keepEvaluated();
+    const auto first = [&](auto& lane) { return std::span(lane).first(n); };
+    foot.eval({first(samples.x), first(samples.y), first(samples.z)},
+              Spans<3>{{first(x), first(y), first(z)}});
+    step.surface.eval({first(x), first(y), first(z)}, first(residual));
     count.searched = n;
     for (std::size_t i = 0; i < n; ++i)
       count.missed += !(std::abs(residual[i]) <= kFoundVoxels * options_.voxelSize);
@@ -529,9 +551,9 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
   // bricks that no later layer can bring to the surface are dropped, and sums need no bricks far inside.
   constexpr double kGrowth = 1.8, kKept = 0.68, kSum = 0.78;
   constexpr double kPacked = sizeof(std::uint16_t) * double(BrickGrid::kVolume);
-  constexpr double kUnpacked = sizeof(float) * double(BrickGrid::kVolume);
-  // What bakes and smoothing hold beside the samples.
-  constexpr double kWork = 1.2;
+  constexpr double kUnpacked = sizeof(float) * double(BrickSamples::kCount);
+  // What bakes and smoothing hold beside the samples, or the codes of the bricks that are packed first.
+  constexpr double kWork = 1.4;
   CumuloBytes bytes;
   double sum = 0;
   for (std::size_t i = 0; i < layers.size(); ++i) {
@@ -557,7 +579,7 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
 }
 
 GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
-                            const CumuloGridOptions& options, const Progress& progress) {
+                            CumuloGridOptions options, const Progress& progress) {
   require(!options.box.isEmpty() && isFinite(options.box.min) && isFinite(options.box.max),
           "griddedCumulo: the box of the base must be finite and not empty");
   require(options.medialSmoothing >= 0 && options.medialSmoothing <= kMaxMedialSmoothing,
@@ -570,11 +592,20 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
   LayerSampler sampler(layers, options, progress);
   CumuloOptions form{.voxelSize = options.voxelSize,
                      .newtonSteps = options.newtonSteps,
-                     .closestPoint = options.closestPoint};
-  form.bake = [&](const CumuloStep& step) { return sampler(step); };
+                     .closestPoint = std::move(options.closestPoint)};
+  options.closestPoint.reset();
+  // The first layer's passes all read the base at the same voxels; each level of a distance takes its time.
+  const float margin = marginOf(layers, 0, options);
+  detail::BrickMemo memo(base, cumuloVoxelSize(layers, 0, options.voxelSize),
+                         options.box.expanded(displacementBound(layers) + margin), kWholePositions);
+  form.bake = [&](const CumuloStep& step) {
+    CumuloSampled sampled = sampler(step);
+    memo.clear();
+    return sampled;
+  };
   form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options); };
   GriddedCumulo result;
-  result.surface = cumulo(base, layers, form);
+  result.surface = cumulo(memo.field(), layers, std::move(form));
   result.estimate = sampler.estimate;
   result.estimateVoxelSize = sampler.estimateVoxelSize;
   result.estimateError = kEstimateErrorVoxels * sampler.estimateVoxelSize;

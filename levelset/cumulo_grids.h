@@ -27,7 +27,7 @@ struct CumuloGridOptions {
   /// Half width of the edge, world units: as far as this from the surface, on either side, the result is the
   /// full sum. It always is within 3 voxels.
   float edge = 0.0f;
-  /// See CumuloOptions::closestPoint.
+  /// See CumuloOptions::closestPoint: moved here it is freed before the second layer.
   std::optional<VectorField> closestPoint{};
   /// Voxels by which the places where displacement jumps over the medial axis grow before they are smoothed,
   /// at least two voxels of the layer's own grid; 0 leaves the jumps.
@@ -98,6 +98,6 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
 /// @throws Error as `cumulo`, and if the box is empty or medialSmoothing is outside
 /// 0 .. kMaxMedialSmoothing; Cancelled.
 GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
-                            const CumuloGridOptions& options, const Progress& progress = silent());
+                            CumuloGridOptions options, const Progress& progress = silent());
 
 }  // namespace nephele

@@ -2,9 +2,9 @@
 //
 // From coarse cubes of bricks to single ones, every knife is asked for its range: one that keeps away from a
 // cube is decided for all of it. Cubes deep inside the shape with all knives decided are settled whole; the
-// bricks that are left are sampled, once, and their samples inside the shape are parted by one undecided
-// knife after the other, as sets of bits. Of Voronoi cells those stay that can be the nearest, or whose
-// boundary can be near.
+// bricks that are left are sampled, once, into one array, and their samples inside the shape are parted by
+// one undecided knife after the other, as sets of bits. Of Voronoi cells those stay that can be the nearest,
+// or whose boundary can be near.
 #include "levelset/cut_bricks.h"
 
 #include <fmt/format.h>
@@ -12,12 +12,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numeric>
 
+#include "levelset/cut_kernels.h"
 #include "levelset/lattice.h"
 #include "modeling/error.h"
+#include "modeling/field_node.h"
 #include "modeling/parallel.h"
 
 namespace nephele::detail {
@@ -26,27 +27,214 @@ namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr std::size_t kSamples = CutBrick::kSamples;
+constexpr std::size_t kCubesPerTask = 8, kBricksPerTask = 16;
 
-void setBit(KnifeBits& bits, std::uint32_t k) {
-  bits[k / 64] |= std::uint64_t(1) << (k % 64);
-}
-
-/// The samples where sign * value > limit.
-BrickMask samplesAbove(std::span<const float> values, float limit, float sign) {
-  BrickMask mask;
-  for (std::size_t z = 0; z < 8; ++z) {
-    std::uint64_t slice = 0;
-    for (std::size_t i = 0; i < 64; ++i) slice |= std::uint64_t(sign * values[64 * z + i] > limit) << i;
-    mask.slices[z] = slice;
-  }
-  return mask;
-}
-
-/// A cube of bricks during the walk.
+/// A cube of bricks during the walk: its first brick, and what its parent knew.
 struct Cube {
-  CutBrick leaf;  ///< Its first brick and what is known of all of them.
-  int edge;
+  Vec3i brick;
+  const CutKnowledge* known;
   ScalarField shape;
+};
+
+/// A brick that the walk left.
+struct Candidate {
+  Cube cube;
+  bool isUniform;
+  std::size_t firstSample = 0;
+};
+
+/// The samples of a brick as points, and their coordinates on each axis.
+struct BrickPoints {
+  std::array<std::array<float, kBrick>, 3> along;
+  std::array<PointBlock, 2> blocks;
+
+  BrickPoints(const Vec3i& brick, float h, Scratch& scratch, Scratch::Frame& frame) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (int i = 0; i < kBrick; ++i)
+        along[std::size_t(axis)][std::size_t(i)] = float(brick[axis] * 8 + i) * h;
+    for (std::size_t half = 0; half < 2; ++half) {
+      const BlockLanes<3> lanes = frame.lanes<3>();
+      for (std::size_t row = 0; row < kBlockSize / kBrick; ++row) {
+        const std::size_t i = row * kBrick;
+        std::copy_n(along[0].data(), kBrick, lanes[0] + i);
+        std::fill_n(lanes[1] + i, kBrick, along[1][row % kBrick]);
+        std::fill_n(lanes[2] + i, kBrick, along[2][4 * half + row / kBrick]);
+      }
+      blocks[half] = scratch.pointBlock(lanes, kBlockSize);
+    }
+  }
+};
+static_assert(kSamples == 2 * kBlockSize);
+
+void divideBySlope(std::span<float> values, const std::array<const float*, 3>& slopes) {
+  for (std::size_t s = 0; s < values.size(); ++s) {
+    const float slope = length(Vec3f{slopes[0][s], slopes[1][s], slopes[2][s]});
+    if (slope > 0) values[s] /= slope;
+  }
+}
+
+void evaluateKnife(const Knife& knife, const PointBlock& points, float* values, Scratch& scratch) {
+  const FieldNode<float>& node = *knife.field.node();
+  if (!(knife.steepest > 1)) {
+    node.eval(points, {values}, scratch);
+    return;
+  }
+  Scratch::Frame frame(scratch);
+  const BlockLanes<3> slopes = frame.lanes<3>();
+  node.evalGrad(points, {values}, slopes, scratch);
+  divideBySlope({values, std::size_t(points.count)}, {slopes[0], slopes[1], slopes[2]});
+}
+
+/// Samples of one combination, while a brick is parted.
+struct OpenMember {
+  CutCode code;
+  BrickMask samples;
+};
+
+/// What a block of bricks became.
+struct SampledBlock {
+  MemoryChunks chunks;
+  std::vector<CutBrick> bricks;
+  std::vector<OpenMember> members;
+};
+
+/// Parts the samples of one brick after the other.
+class Sampler {
+ public:
+  Sampler(const CutOptions& options, SampledBlock& block)
+      : options_(options),
+        block_(block),
+        h_(options.voxelSize),
+        band_(options.bandVoxels * options.voxelSize),
+        halfKerf_(options.kerf / 2) {}
+
+  /// `samples` has room for them.
+  void add(const Candidate& candidate, float* samples) {
+    const CutKnowledge& known = *candidate.cube.known;
+    CutBrick brick{candidate.cube.brick, candidate.isUniform, &known, samples, block_.members.size()};
+    if (candidate.isUniform) {
+      const std::uint32_t cell = known.cells.empty() ? CutCode::kNoCell : known.cells.front();
+      block_.members.push_back({{known.sides, cell}, BrickMask::all()});
+    } else if (!sample(candidate, samples)) {
+      return;
+    }
+    block_.bricks.push_back(brick);
+  }
+
+ private:
+  /// False if the brick has nothing to say.
+  bool sample(const Candidate& candidate, float* samples) {
+    Scratch& scratch = Scratch::local();
+    Scratch::Frame frame(scratch);
+    const BrickPoints points(candidate.cube.brick, h_, scratch, frame);
+    for (std::size_t half = 0; half < 2; ++half)
+      candidate.cube.shape.node()->eval(points.blocks[half], {samples + half * kBlockSize}, scratch);
+    if (sidesOf(samples, -band_).above.isEmpty()) return false;
+    const CutKnowledge& known = *candidate.cube.known;
+    open_.clear();
+    if (const BrickMask solid = sidesOf(samples, 0).above; !solid.isEmpty())
+      open_.push_back({{known.sides, CutCode::kNoCell}, solid});
+    for (const std::uint32_t knife : known.undecided) {
+      samples += kSamples;
+      for (std::size_t half = 0; half < 2; ++half)
+        evaluateKnife(options_.knives[knife], points.blocks[half], samples + half * kBlockSize, scratch);
+      split(knife, samples);
+    }
+    if (!known.cells.empty()) splitByCell(known, points);
+    block_.members.insert(block_.members.end(), open_.begin(), open_.end());
+    return true;
+  }
+
+  void split(std::uint32_t knife, const float* values) {
+    if (open_.empty()) return;
+    const Sides sides = sidesOf(values, halfKerf_);
+    next_.clear();
+    for (const OpenMember& member : open_) {
+      const BrickMask high = member.samples & sides.above, low = member.samples & sides.below;
+      if (!low.isEmpty()) next_.push_back({member.code, low});
+      if (high.isEmpty()) continue;
+      const std::span<std::uint64_t> bits = block_.chunks.copyOf(member.code.sides);
+      bits[knife / 64] |= std::uint64_t(1) << (knife % 64);
+      next_.push_back({{bits, member.code.cell}, high});
+    }
+    open_.swap(next_);
+  }
+
+  void splitByCell(const CutKnowledge& known, const BrickPoints& points) {
+    const std::size_t count = known.cells.size();
+    std::vector<BrickMask> ofCell(count);
+    std::vector<std::vector<Bisector>> around(count);
+    for (std::size_t s = 0; s < kSamples; ++s) {
+      const Vec3f p{points.along[0][s & 7], points.along[1][s >> 3 & 7], points.along[2][s >> 6]};
+      std::size_t nearest = 0;
+      float least = std::numeric_limits<float>::infinity();
+      for (std::size_t c = 0; c < count; ++c) {
+        const Vec3f away = options_.cells[known.cells[c]] - p;
+        if (const float squared = dot(away, away); squared < least) least = squared, nearest = c;
+      }
+      std::vector<Bisector>& sides = around[nearest];
+      if (sides.empty())
+        for (const std::uint32_t other : known.cells)
+          if (other != known.cells[nearest])
+            sides.emplace_back(options_.cells[known.cells[nearest]], options_.cells[other]);
+      if (std::all_of(sides.begin(), sides.end(),
+                      [&](const Bisector& side) { return side.at(p) > halfKerf_; }))
+        ofCell[nearest].add(int(s));
+    }
+    next_.clear();
+    for (const OpenMember& member : open_)
+      for (std::size_t c = 0; c < count; ++c)
+        if (const BrickMask shared = member.samples & ofCell[c]; !shared.isEmpty())
+          next_.push_back({{member.code.sides, known.cells[c]}, shared});
+    open_.swap(next_);
+  }
+
+  const CutOptions& options_;
+  SampledBlock& block_;
+  float h_, band_, halfKerf_;
+  std::vector<OpenMember> open_, next_;
+};
+
+/// Numbers codes as they come.
+class CodeNumbers {
+ public:
+  explicit CodeNumbers(std::vector<CutCode>& codes) : codes_(codes), slots_(1024, kEmpty) {}
+
+  std::uint32_t numberOf(const CutCode& code) {
+    if (2 * codes_.size() >= slots_.size()) grow();
+    const std::size_t at = slotOf(code);
+    if (slots_[at] == kEmpty) {
+      slots_[at] = std::uint32_t(codes_.size());
+      codes_.push_back(code);
+    }
+    return slots_[at];
+  }
+
+ private:
+  static constexpr std::uint32_t kEmpty = 0xFFFFFFFFu;
+
+  std::size_t slotOf(const CutCode& code) const {
+    std::uint64_t hash = code.cell;
+    for (const std::uint64_t word : code.sides) {
+      hash = (hash ^ word) * 0x9E3779B97F4A7C15ull;
+      hash ^= hash >> 32;
+    }
+    std::size_t at = hash % slots_.size();
+    while (slots_[at] != kEmpty && !isSame(codes_[slots_[at]], code)) at = (at + 1) % slots_.size();
+    return at;
+  }
+
+  static bool isSame(const CutCode& a, const CutCode& b) {
+    return a.cell == b.cell && std::equal(a.sides.begin(), a.sides.end(), b.sides.begin());
+  }
+
+  void grow() {
+    slots_.assign(2 * slots_.size(), kEmpty);
+    for (std::uint32_t i = 0; i < codes_.size(); ++i) slots_[slotOf(codes_[i])] = i;
+  }
+
+  std::vector<CutCode>& codes_;
+  std::vector<std::uint32_t> slots_;
 };
 
 class Walk {
@@ -59,7 +247,15 @@ class Walk {
         band_(options.bandVoxels * options.voxelSize),
         halfKerf_(options.kerf / 2) {}
 
-  std::vector<CutBrick> run() {
+  CutBricks run() {
+    findCandidates();
+    std::sort(candidates_.begin(), candidates_.end(),
+              [](const Candidate& a, const Candidate& b) { return comesBefore(a.cube.brick, b.cube.brick); });
+    return sampleAll();
+  }
+
+ private:
+  void findCandidates() {
     const Box box = options_.box.expanded(band_);
     const float width = h_ * kBrick;
     const auto brickOfPoint = [width](const Vec3f& p) {
@@ -72,174 +268,163 @@ class Walk {
             fmt::format("cut: voxelSize {} is too small for a shape {} wide", h_, box.longestSide()));
     const Vec3i first = brickOfPoint(box.min), last = brickOfPoint(box.max);
     constexpr int kFirstEdge = 16;
-    const std::size_t words = (options_.knives.size() + 63) / 64;
-    CutBrick everything;
-    everything.decided.assign(words, 0);
-    everything.sides.assign(words, 0);
-    everything.undecided.resize(options_.knives.size());
-    std::iota(everything.undecided.begin(), everything.undecided.end(), 0u);
-    everything.cells.resize(options_.cells.size());
-    std::iota(everything.cells.begin(), everything.cells.end(), 0u);
+    const CutKnowledge* nothing = knowNothing();
     std::vector<Cube> cubes;
     for (int z = first.z; z <= last.z; z += kFirstEdge)
       for (int y = first.y; y <= last.y; y += kFirstEdge)
-        for (int x = first.x; x <= last.x; x += kFirstEdge) {
-          everything.brick = {x, y, z};
-          cubes.push_back({everything, kFirstEdge, shape_});
-        }
+        for (int x = first.x; x <= last.x; x += kFirstEdge) cubes.push_back({{x, y, z}, nothing, shape_});
 
+    struct Visited {
+      MemoryChunks chunks;
+      std::vector<Cube> halves;
+      std::vector<Candidate> candidates;
+    };
     for (int edge = kFirstEdge; edge >= 1; edge /= 2) {
-      std::vector<std::vector<Cube>> halves(cubes.size());
-      std::vector<std::vector<CutBrick>> leaves(cubes.size());
+      std::vector<Visited> blocks((cubes.size() + kCubesPerTask - 1) / kCubesPerTask);
       parallelFor(
-          cubes.size(), 8,
+          cubes.size(), kCubesPerTask,
           [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) visit(std::move(cubes[i]), halves[i], leaves[i]);
+            Visited& block = blocks[begin / kCubesPerTask];
+            for (std::size_t i = begin; i < end; ++i)
+              visit(cubes[i], edge, block.chunks, block.halves, block.candidates);
           },
           progress_);
-      std::vector<Cube> next;
-      for (auto& list : halves) std::move(list.begin(), list.end(), std::back_inserter(next));
-      for (auto& list : leaves) std::move(list.begin(), list.end(), std::back_inserter(bricks_));
-      cubes = std::move(next);
+      cubes.clear();
+      for (Visited& block : blocks) {
+        std::move(block.halves.begin(), block.halves.end(), std::back_inserter(cubes));
+        std::move(block.candidates.begin(), block.candidates.end(), std::back_inserter(candidates_));
+        chunks_.push_back(std::move(block.chunks));
+      }
     }
-    std::sort(bricks_.begin(), bricks_.end(),
-              [](const CutBrick& a, const CutBrick& b) { return comesBefore(a.brick, b.brick); });
-    return std::move(bricks_);
   }
 
- private:
-  Vec3f position(const Vec3i& voxel) const { return Vec3f(voxel) * h_; }
+  const CutKnowledge* knowNothing() {
+    MemoryChunks& chunks = chunks_.emplace_back();
+    const auto none = chunks.take<std::uint64_t>((options_.knives.size() + 63) / 64);
+    std::fill(none.begin(), none.end(), 0);
+    const auto knives = chunks.take<std::uint32_t>(options_.knives.size());
+    std::iota(knives.begin(), knives.end(), 0u);
+    const auto cells = chunks.take<std::uint32_t>(options_.cells.size());
+    std::iota(cells.begin(), cells.end(), 0u);
+    return &(chunks.take<CutKnowledge>(1)[0] = {none, none, knives, cells});
+  }
 
-  void visit(Cube cube, std::vector<Cube>& halves, std::vector<CutBrick>& leaves) const {
-    CutBrick& leaf = cube.leaf;
-    const Vec3i firstVoxel = leaf.brick * kBrick;
-    const int lastStep = cube.edge * kBrick - 1;
-    const Box box{position(firstVoxel), position(firstVoxel + Vec3i{lastStep, lastStep, lastStep})};
+  void visit(const Cube& cube, int edge, MemoryChunks& chunks, std::vector<Cube>& halves,
+             std::vector<Candidate>& candidates) const {
+    const Vec3i firstVoxel = cube.brick * kBrick;
+    const int lastStep = edge * kBrick - 1;
+    const Box box{Vec3f(firstVoxel) * h_, Vec3f(firstVoxel + Vec3i{lastStep, lastStep, lastStep}) * h_};
     const Interval range = cube.shape.range(box);
     if (range.max <= -band_) return;
-    decide(leaf, box);
+    const CutKnowledge* known = decide(*cube.known, box, chunks);
     // The last bit of a band's end is lost on its way through other grids.
     constexpr float kNearly = 0.999f;
-    leaf.isUniform = range.min >= kNearly * band_ && leaf.undecided.empty() && leaf.cells.size() <= 1;
-    if (cube.edge > 1 && !leaf.isUniform) {
+    const bool isUniform =
+        range.min >= kNearly * band_ && known->undecided.empty() && known->cells.size() <= 1;
+    if (edge > 1 && !isUniform) {
       const ScalarField local = cube.shape.restrictedTo(box);
-      const int half = cube.edge / 2;
-      for (int i = 0; i < 8; ++i) {
-        halves.push_back({leaf, half, local});
-        halves.back().leaf.brick = leaf.brick + Vec3i{i & 1, i >> 1 & 1, i >> 2} * half;
-      }
+      for (int i = 0; i < 8; ++i)
+        halves.push_back({cube.brick + Vec3i{i & 1, i >> 1 & 1, i >> 2} * (edge / 2), known, local});
       return;
     }
-    if (!leaf.isUniform) {
-      if (sample(leaf, cube.shape)) leaves.push_back(std::move(leaf));
-      return;
-    }
-    leaf.members.emplace_back(CutCode{leaf.sides, leaf.cells.empty() ? CutCode::kNoCell : leaf.cells.front()},
-                              BrickMask::all());
-    // The code says it all.
-    leaf.decided.clear();
-    leaf.sides.clear();
-    leaf.cells.clear();
-    const Vec3i origin = leaf.brick;
-    for (int z = 0; z < cube.edge; ++z)
-      for (int y = 0; y < cube.edge; ++y)
-        for (int x = 0; x < cube.edge; ++x) {
-          leaves.push_back(leaf);
-          leaves.back().brick = origin + Vec3i{x, y, z};
-        }
+    // Deep inside, a grid is one value.
+    const ScalarField local = range.isPoint() ? ScalarField(range.min) : cube.shape;
+    for (int z = 0; z < edge; ++z)
+      for (int y = 0; y < edge; ++y)
+        for (int x = 0; x < edge; ++x)
+          candidates.push_back({{cube.brick + Vec3i{x, y, z}, known, local}, isUniform});
   }
 
   /// Moves knives that keep away from the box to the decided ones, and drops cells that do.
-  void decide(CutBrick& leaf, const Box& box) const {
-    std::erase_if(leaf.undecided, [&](std::uint32_t k) {
+  const CutKnowledge* decide(const CutKnowledge& before, const Box& box, MemoryChunks& chunks) const {
+    CutKnowledge known = before;
+    std::span<std::uint64_t> decided, sides;
+    std::span<std::uint32_t> undecided;
+    std::size_t kept = 0;
+    for (std::size_t u = 0; u < before.undecided.size(); ++u) {
+      const std::uint32_t k = before.undecided[u];
       const Knife& knife = options_.knives[k];
       const float reach = knife.steepest * (band_ + halfKerf_);
       const Interval range = knife.field.range(box);
-      if (!(range.min > reach) && !(range.max < -reach)) return false;
-      setBit(leaf.decided, k);
-      if (range.min > reach) setBit(leaf.sides, k);
-      return true;
-    });
-    if (leaf.cells.size() < 2) return;
+      const bool isAbove = range.min > reach;
+      if (!isAbove && !(range.max < -reach)) {
+        if (!undecided.empty()) undecided[kept] = k;
+        ++kept;
+        continue;
+      }
+      if (undecided.empty()) {
+        undecided = chunks.copyOf(before.undecided);
+        decided = chunks.copyOf(before.decided);
+        sides = chunks.copyOf(before.sides);
+        known = {decided, sides, undecided, before.cells};
+      }
+      decided[k / 64] |= std::uint64_t(1) << (k % 64);
+      if (isAbove) sides[k / 64] |= std::uint64_t(1) << (k % 64);
+    }
+    known.undecided = known.undecided.first(kept);
+    if (known.cells.size() >= 2) known.cells = cellsNear(known.cells, box, chunks);
+    return &(chunks.take<CutKnowledge>(1)[0] = known);
+  }
+
+  std::span<const std::uint32_t> cellsNear(std::span<const std::uint32_t> cells, const Box& box,
+                                           MemoryChunks& chunks) const {
     const Vec3f centre = box.center();
     float nearest = std::numeric_limits<float>::infinity();
-    for (const std::uint32_t c : leaf.cells) nearest = std::min(nearest, length(options_.cells[c] - centre));
+    for (const std::uint32_t c : cells) nearest = std::min(nearest, length(options_.cells[c] - centre));
     // Farther than the nearest point from everywhere in the box by twice the band: its boundary is not near.
     const float reach = (nearest + length(box.size()) + 2 * (band_ + halfKerf_)) * (1 + 1e-5f);
-    std::erase_if(leaf.cells, [&](std::uint32_t c) { return length(options_.cells[c] - centre) > reach; });
+    std::vector<std::uint32_t> near;
+    for (const std::uint32_t c : cells)
+      if (!(length(options_.cells[c] - centre) > reach)) near.push_back(c);
+    return near.size() == cells.size() ? cells : chunks.copyOf(std::span<const std::uint32_t>(near));
   }
 
-  /// Evaluates the samples of a brick and parts those inside the shape. False if it has nothing to say.
-  bool sample(CutBrick& leaf, const ScalarField& shape) const {
-    std::array<std::vector<float>, 3> lanes;
-    for (int axis = 0; axis < 3; ++axis) {
-      lanes[std::size_t(axis)].resize(kSamples);
-      for (std::size_t s = 0; s < kSamples; ++s) lanes[std::size_t(axis)][s] = leaf.position(s, h_)[axis];
+  CutBricks sampleAll() {
+    CutBricks result;
+    std::size_t count = 0;
+    for (Candidate& candidate : candidates_) {
+      candidate.firstSample = count;
+      if (!candidate.isUniform) count += (1 + candidate.cube.known->undecided.size()) * kSamples;
     }
-    const PointSpans points{lanes[0], lanes[1], lanes[2]};
-    leaf.samples.resize((1 + leaf.undecided.size()) * kSamples);
-    const std::span<float> all(leaf.samples);
-    const std::span<float> inside = all.first(kSamples);
-    shape.eval(points, inside);
-    if (samplesAbove(inside, -band_, 1).isEmpty()) return false;
-    const BrickMask solid = samplesAbove(inside, 0, 1);
-    if (!solid.isEmpty()) leaf.members.emplace_back(CutCode{leaf.sides, CutCode::kNoCell}, solid);
-    for (std::size_t u = 0; u < leaf.undecided.size(); ++u) {
-      const std::span<float> values = all.subspan((1 + u) * kSamples, kSamples);
-      evaluateKnife(options_.knives[leaf.undecided[u]], points, values);
-      split(leaf, leaf.undecided[u], values);
-    }
-    if (!leaf.cells.empty()) splitByCell(leaf);
-    return true;
+    result.samples = LargeArray(count);
+    std::vector<SampledBlock> blocks((candidates_.size() + kBricksPerTask - 1) / kBricksPerTask);
+    parallelFor(
+        candidates_.size(), kBricksPerTask,
+        [&](std::size_t begin, std::size_t end) {
+          Sampler sampler(options_, blocks[begin / kBricksPerTask]);
+          for (std::size_t i = begin; i < end; ++i)
+            sampler.add(candidates_[i], result.samples.data() + candidates_[i].firstSample);
+        },
+        progress_);
+    gather(blocks, result);
+    return result;
   }
 
-  void split(CutBrick& leaf, std::uint32_t knife, std::span<const float> values) const {
-    const BrickMask above = samplesAbove(values, halfKerf_, 1), below = samplesAbove(values, halfKerf_, -1);
-    std::vector<std::pair<CutCode, BrickMask>> members;
-    for (auto& [code, samples] : leaf.members) {
-      const BrickMask high = samples & above, low = samples & below;
-      if (!low.isEmpty()) members.emplace_back(code, low);
-      if (high.isEmpty()) continue;
-      setBit(code.sides, knife);
-      members.emplace_back(std::move(code), high);
-    }
-    leaf.members = std::move(members);
-  }
-
-  void splitByCell(CutBrick& leaf) const {
-    std::vector<BrickMask> ofCell(leaf.cells.size());
-    for (std::size_t s = 0; s < kSamples; ++s) {
-      const Vec3f p = leaf.position(s, h_);
-      std::size_t nearest = 0;
-      float least = std::numeric_limits<float>::infinity();
-      for (std::size_t c = 0; c < leaf.cells.size(); ++c) {
-        const Vec3f away = options_.cells[leaf.cells[c]] - p;
-        if (const float squared = dot(away, away); squared < least) least = squared, nearest = c;
+  void gather(std::vector<SampledBlock>& blocks, CutBricks& result) {
+    std::size_t bricks = 1, members = 0;
+    for (const SampledBlock& block : blocks) bricks += block.bricks.size(), members += block.members.size();
+    result.bricks.reserve(bricks);
+    result.members.reserve(members);
+    CodeNumbers numbers(result.codes);
+    result.chunks = std::move(chunks_);
+    for (SampledBlock& block : blocks) {
+      for (CutBrick& brick : block.bricks) {
+        brick.firstMember += result.members.size();
+        result.bricks.push_back(brick);
       }
-      if (leaf.cells.size() == 1 || insideCell(leaf, leaf.cells[nearest], p) > halfKerf_)
-        ofCell[nearest].add(int(s));
+      for (const OpenMember& member : block.members)
+        result.members.push_back({numbers.numberOf(member.code), member.samples});
+      result.chunks.push_back(std::move(block.chunks));
     }
-    std::vector<std::pair<CutCode, BrickMask>> members;
-    for (const auto& [code, samples] : leaf.members)
-      for (std::size_t c = 0; c < leaf.cells.size(); ++c)
-        if (const BrickMask shared = samples & ofCell[c]; !shared.isEmpty())
-          members.emplace_back(CutCode{code.sides, leaf.cells[c]}, shared);
-    leaf.members = std::move(members);
-  }
-
-  /// Distance to the sides of a cell that are near the brick.
-  float insideCell(const CutBrick& leaf, std::uint32_t cell, const Vec3f& p) const {
-    float least = std::numeric_limits<float>::infinity();
-    for (const std::uint32_t other : leaf.cells)
-      if (other != cell) least = std::min(least, Bisector(options_.cells[cell], options_.cells[other]).at(p));
-    return least;
+    result.bricks.push_back({.brick = {}, .firstMember = members});
   }
 
   const ScalarField& shape_;
   const CutOptions& options_;
   const Progress& progress_;
   float h_, band_, halfKerf_;
-  std::vector<CutBrick> bricks_;
+  std::vector<MemoryChunks> chunks_;
+  std::vector<Candidate> candidates_;
 };
 
 }  // namespace
@@ -252,14 +437,10 @@ void evaluateKnife(const Knife& knife, const PointSpans& points, std::span<float
   std::array<std::vector<float>, 3> slopes;
   for (auto& lane : slopes) lane.resize(points.size());
   knife.field.evalGrad(points, values, {{slopes[0], slopes[1], slopes[2]}});
-  for (std::size_t s = 0; s < points.size(); ++s) {
-    const float slope = length(Vec3f{slopes[0][s], slopes[1][s], slopes[2][s]});
-    if (slope > 0) values[s] /= slope;
-  }
+  divideBySlope(values, {slopes[0].data(), slopes[1].data(), slopes[2].data()});
 }
 
-std::vector<CutBrick> cutBricks(const ScalarField& shape, const CutOptions& options,
-                                const Progress& progress) {
+CutBricks cutBricks(const ScalarField& shape, const CutOptions& options, const Progress& progress) {
   return Walk(shape, options, progress).run();
 }
 

@@ -8,16 +8,21 @@
 
 namespace nephele::detail {
 
-/// Makes room in a large vector of plain values, on huge pages where the system offers them: first touch
-/// costs a fifth.
+/// Asks for huge pages where values have not been touched yet: first touch then costs a fifth.
 template <class T>
-void reserveLarge(std::vector<T>& values, std::size_t count) {
+void useHugePages(T* first, T* last) {
   constexpr std::uintptr_t kHugePage = std::uintptr_t(1) << 21;
-  values.reserve(count);
-  const auto begin = (reinterpret_cast<std::uintptr_t>(values.data()) + kHugePage - 1) & ~(kHugePage - 1);
-  const auto end = reinterpret_cast<std::uintptr_t>(values.data() + values.capacity()) & ~(kHugePage - 1);
+  const auto begin = (reinterpret_cast<std::uintptr_t>(first) + kHugePage - 1) & ~(kHugePage - 1);
+  const auto end = reinterpret_cast<std::uintptr_t>(last) & ~(kHugePage - 1);
   // A hint: where the system refuses, ordinary pages do.
   if (begin < end) static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+}
+
+/// Makes room in a large vector of plain values, on huge pages where the system offers them.
+template <class T>
+void reserveLarge(std::vector<T>& values, std::size_t count) {
+  values.reserve(count);
+  useHugePages(values.data(), values.data() + values.capacity());
 }
 
 /// Grows a large vector of plain values on huge pages.

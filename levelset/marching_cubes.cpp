@@ -233,30 +233,15 @@ class Mesher {
           const unsigned cell =
               (r[0] >> x & 3) | (r[1] >> x & 3) << 2 | (r[2] >> x & 3) << 4 | (r[3] >> x & 3) << 6;
           const unsigned ambiguous = table_.ambiguousFaces(cell);
-          const unsigned joined = ambiguous ? joinedFaces(cell, ambiguous, samples, sampleIndex(x, y, z)) : 0;
+          const auto value = [&](int corner) {
+            return double(samples[sampleIndex(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2))]) -
+                   isovalue_;
+          };
+          const unsigned joined = ambiguous ? CellTable::joinedFaces(cell, ambiguous, value) : 0;
           body(Vec3i{x, y, z}, table_.pattern(cell, joined));
         }
       }
     }
-  }
-
-  // The inside corners of a face are joined where the saddle of its bilinear interpolant is inside. Both
-  // cells of the face multiply the same pairs of numbers, so that they agree to the bit.
-  unsigned joinedFaces(unsigned cell, unsigned ambiguous, const Samples& samples, int first) const {
-    unsigned joined = 0;
-    for (unsigned rest = ambiguous; rest; rest &= rest - 1) {
-      const int face = std::countr_zero(rest);
-      const auto& q = CellTable::faceCorners(face);
-      const auto value = [&](int i) {
-        const int corner = q[i];
-        return double(samples[first + sampleIndex(corner & 1, corner >> 1 & 1, corner >> 2)]) - isovalue_;
-      };
-      const double even = value(0) * value(2);
-      const double odd = value(1) * value(3);
-      const bool evenInside = cell >> q[0] & 1;
-      if (evenInside ? even > odd : odd > even) joined |= 1u << face;
-    }
-    return joined;
   }
 
   Mesh allocate() {

@@ -35,6 +35,22 @@ class CellTable {
     return {corners_.data() + pattern.first, std::size_t(3) * pattern.triangleCount};
   }
 
+  /// Of the ambiguous faces those whose inside corners are joined: where the saddle of the bilinear
+  /// interpolant is inside. `value(c)` is the sample at corner c less the isovalue; both cells of a face
+  /// multiply the same pairs of numbers, so that they agree to the bit.
+  template <class Value>
+  static unsigned joinedFaces(unsigned signs, unsigned ambiguous, const Value& value) {
+    unsigned joined = 0;
+    for (unsigned face = 0; face < 6; ++face) {
+      if ((ambiguous >> face & 1) == 0) continue;
+      const auto& q = faceCorners(int(face));
+      const double even = value(q[0]) * value(q[2]), odd = value(q[1]) * value(q[3]);
+      const bool evenInside = signs >> q[0] & 1;
+      if (evenInside ? even > odd : odd > even) joined |= 1u << face;
+    }
+    return joined;
+  }
+
   /// The corners of face `face`, counter-clockwise from outside the cell.
   static const std::array<std::uint8_t, 4>& faceCorners(int face);
   static int edgeAxis(int edge) { return edge >> 2; }

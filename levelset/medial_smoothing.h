@@ -1,6 +1,8 @@
 #pragma once
 
-#include "levelset/brick_grid.h"
+#include <vector>
+
+#include "levelset/brick_samples.h"
 #include "modeling/progress.h"
 
 namespace nephele {
@@ -14,16 +16,23 @@ struct MedialSmoothingOptions {
   int steps = 16;
 };
 
+struct MedialSmoothing {
+  /// Samples that were diffused.
+  std::size_t diffused = 0;
+  /// Of every pool brick: whether it is to be stored without signs.
+  std::vector<bool> signless;
+};
+
 /// Smooths a displacement where the medial axis makes it jump.
 ///
 /// `signedDisplacement` holds samples whose absolute value is the displacement. Around every pair of
 /// neighbours that differ by more than `jump`, the absolute value is diffused, and the bricks that see those
-/// samples lose the sign: a change of sign across a jump is no crease, and interpolating it would cut a false
-/// one. Samples that are exactly 0 lie outside the band; they neither count as jumps nor conduct. Borders and
-/// ranges are up to date afterwards. Each pool brick but brick 0 must stand at one position. All cores; the
-/// same bits at any thread count. Returns the number of samples that were diffused.
+/// samples, their own or in their borders, are to lose the sign: a change of sign across a jump is no crease,
+/// and interpolating it would cut a false one. Samples that are exactly 0 lie outside the band; they neither
+/// count as jumps nor conduct. Ranges are up to date afterwards. Each pool brick but brick 0 must stand at
+/// one position, and brick 0 be 0. All cores; the same bits at any thread count.
 /// @throws Error if jump is not > 0 or a count is negative; Cancelled.
-std::size_t smoothMedialJumps(BrickGrid& signedDisplacement, const MedialSmoothingOptions& options,
-                              const Progress& progress = silent());
+MedialSmoothing smoothMedialJumps(detail::BrickSamples& signedDisplacement,
+                                  const MedialSmoothingOptions& options, const Progress& progress = silent());
 
 }  // namespace nephele

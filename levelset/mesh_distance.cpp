@@ -55,6 +55,50 @@ struct Level {
   float nextStart = 0.0f, nextBlend = 1.0f;
   /// The next level holds more of this side; else the side's band ends within this level.
   bool continuesOutside = false, continuesInside = false;
+
+  /// -1 or 1 for points where the nearest sample alone tells that the next levels take over wholly, on the
+  /// outside or the inside; else 0. Looks at one sample in place of interpolating 64.
+  void sidesBeyond(const PointBlock& points, float* sides) const {
+    // What lies between a point and its nearest sample, and the error of interpolation, voxels.
+    constexpr float kNearestVoxels = 1.25f;
+    std::array<std::array<std::int32_t, kBlockSize>, 3> voxel;
+    std::array<std::int32_t, kBlockSize> isInside;
+    std::array<std::size_t, kBlockSize> pools, codes;
+    std::fill_n(isInside.begin(), points.count, 1);
+    const std::array<const float*, 3> lanes{points.x, points.y, points.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      // Counted from the table's first voxel, so that numbers are not negative and cutting them off is a
+      // floor.
+      const float scale = grid->worldToIndex.linear(axis, axis);
+      const float shift = 0.5f - float(grid->firstBrick[axis] * kBrick);
+      const float end = float(grid->brickCount[axis] * kBrick);
+      const float* lane = lanes[std::size_t(axis)];
+      std::int32_t* to = voxel[std::size_t(axis)].data();
+      for (int i = 0; i < points.count; ++i) {
+        const float q = lane[i] * scale + shift;
+        const bool inside = q >= 0 && q < end;
+        to[i] = std::int32_t(inside ? q : 0.0f);
+        isInside[std::size_t(i)] &= std::int32_t(inside);
+      }
+    }
+    const auto nx = std::size_t(grid->brickCount.x), ny = std::size_t(grid->brickCount.y);
+    const float beyond = nextStart + nextBlend + kNearestVoxels * grid->voxelSize;
+    const float outside = continuesOutside ? -beyond : -std::numeric_limits<float>::infinity();
+    const float inside = continuesInside ? beyond : std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < std::size_t(points.count); ++i) {
+      const int x = voxel[0][i], y = voxel[1][i], z = voxel[2][i];
+      pools[i] = std::size_t(
+          grid->table[(std::size_t(z >> 3) * ny + std::size_t(y >> 3)) * nx + std::size_t(x >> 3)]);
+      codes[i] = pools[i] * BrickGrid::kVolume + std::size_t(sampleOffset(x & 7, y & 7, z & 7));
+      __builtin_prefetch(grid->codes.data() + codes[i]);
+    }
+    for (std::size_t i = 0; i < std::size_t(points.count); ++i) {
+      const Interval& range = grid->ranges[pools[i]];
+      const float share = float(grid->codes[codes[i]]) * (1 / BrickCode::kLargest);
+      const float sample = range.min + (range.max - range.min) * share;
+      sides[i] = float((int(sample > inside) - int(sample < outside)) * isInside[i]);
+    }
+  }
 };
 
 struct Levels {
@@ -161,48 +205,84 @@ class MeshDistanceNode final : public FieldNode<float> {
     }
   }
 
+  void sample(std::size_t index, const PointBlock& points, float* values, const BlockLanes<3>* grads) const {
+    const BrickGrid& grid = *levels_->all[index].grid;
+    if (index == 0)
+      grads ? sampleTrilinearGrad(grid, points, values, *grads) : sampleTrilinear(grid, points, values);
+    else
+      grads ? sampleTricubicGrad(grid, points, values, *grads) : sampleTricubic(grid, points, values);
+  }
+
+  /// Some points of a block, and where they stand in it.
+  struct Selection {
+    BlockLanes<3> points;
+    std::array<std::uint16_t, kBlockSize> source;
+    int count = 0;
+
+    explicit Selection(Scratch::Frame& frame) : points(frame.lanes<3>()) {}
+    void add(const PointBlock& from, int i, bool isIn) {
+      points[0][count] = from.x[i];
+      points[1][count] = from.y[i];
+      points[2][count] = from.z[i];
+      source[std::size_t(count)] = std::uint16_t(i);
+      count += isIn;
+    }
+  };
+
   void evalFrom(std::size_t index, const PointBlock& points, float* values, const BlockLanes<3>* grads,
                 Scratch& scratch) const {
+    if (index == last_) return sample(index, points, values, grads);
     const Level& level = levels_->all[index];
-    if (index == 0) {
-      grads ? sampleTrilinearGrad(*level.grid, points, values, *grads)
-            : sampleTrilinear(*level.grid, points, values);
-    } else {
-      grads ? sampleTricubicGrad(*level.grid, points, values, *grads)
-            : sampleTricubic(*level.grid, points, values);
-    }
-    if (index == last_) return;
-
     Scratch::Frame frame(scratch);
-    const BlockLanes<3> farPoints = frame.lanes<3>();
-    std::array<std::uint16_t, kBlockSize> source;
-    int farCount = 0;
+    // What this level says of a point that it leaves to the next ones.
+    constexpr float kBeyondAll = std::numeric_limits<float>::max();
+    Selection far(frame);
+    if (index == 0) {
+      // Found out as cheaply as asked for.
+      sample(index, points, values, grads);
+    } else {
+      Selection near(frame);
+      float* sides = frame.lane();
+      level.sidesBeyond(points, sides);
+      for (int i = 0; i < points.count; ++i) {
+        values[i] = sides[i] * kBeyondAll;
+        near.add(points, i, sides[i] == 0);
+      }
+      if (near.count == points.count) {
+        sample(index, points, values, grads);
+      } else if (near.count > 0) {
+        float* nearValues = frame.lane();
+        const BlockLanes<3> nearGrads = frame.lanes<3>();
+        sample(index, scratch.pointBlock(near.points, near.count), nearValues, grads ? &nearGrads : nullptr);
+        for (int k = 0; k < near.count; ++k) {
+          const int i = near.source[std::size_t(k)];
+          values[i] = nearValues[k];
+          if (grads)
+            for (std::size_t c = 0; c < 3; ++c) (*grads)[c][i] = nearGrads[c][k];
+        }
+      }
+    }
+
     const float outside = level.continuesOutside ? -level.nextStart : -std::numeric_limits<float>::infinity();
     const float inside = level.continuesInside ? level.nextStart : std::numeric_limits<float>::infinity();
-    for (int i = 0; i < points.count; ++i) {
-      farPoints[0][farCount] = points.x[i];
-      farPoints[1][farCount] = points.y[i];
-      farPoints[2][farCount] = points.z[i];
-      source[std::size_t(farCount)] = std::uint16_t(i);
-      farCount += values[i] < outside || values[i] > inside;
-    }
-    if (farCount == 0) return;
-    const PointBlock far = scratch.pointBlock(farPoints, farCount);
+    for (int i = 0; i < points.count; ++i) far.add(points, i, (values[i] < outside) | (values[i] > inside));
+    if (far.count == 0) return;
     float* farValues = frame.lane();
     const BlockLanes<3> farGrads = frame.lanes<3>();
-    evalFrom(index + 1, far, farValues, grads ? &farGrads : nullptr, scratch);
+    evalFrom(index + 1, scratch.pointBlock(far.points, far.count), farValues, grads ? &farGrads : nullptr,
+             scratch);
     const float perBlend = 1.0f / level.nextBlend;
-    for (int k = 0; k < farCount; ++k) {
-      const int i = source[std::size_t(k)];
+    for (int k = 0; k < far.count; ++k) {
+      const int i = far.source[std::size_t(k)];
       const float v = values[i];
-      const float t = std::min((std::abs(v) - level.nextStart) * perBlend, 1.0f);
+      const float t = (std::abs(v) - level.nextStart) * perBlend;
       const float step = farValues[k] - v;
-      values[i] = v + t * step;
+      values[i] = t < 1.0f ? v + t * step : farValues[k];
       if (!grads) continue;
-      const float slope = t < 1.0f ? std::copysign(perBlend, v) * step : 0.0f;
+      const float slope = std::copysign(perBlend, v) * step;
       for (std::size_t c = 0; c < 3; ++c) {
         float& g = (*grads)[c][i];
-        g += t * (farGrads[c][k] - g) + slope * g;
+        g = t < 1.0f ? g + (t * (farGrads[c][k] - g) + slope * g) : farGrads[c][k];
       }
     }
   }

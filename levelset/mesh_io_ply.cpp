@@ -4,9 +4,10 @@
 // and properties of any type are passed over. Faces come from lists "vertex_indices" (or "vertex_index") of
 // element face and from triangle strips; texture coordinates from s t, u v or texture_u texture_v of vertices
 // or from a face list "texcoord"; colours become "color" in 0..1. Other scalar vertex properties keep their
-// names. Header lines may end in LF, CR LF or CR; the first line tells which, because binary data may begin
-// with a byte that looks like a line end. Declared counts are held against the bytes that are left before
-// anything is allocated.
+// names, and so do face lists of floats that have the same number of values for every corner of the file:
+// those of "color" (red, green, blue of each corner) are the colours of MeshLab's wedges. Header lines may
+// end in LF, CR LF or CR; the first line tells which, because binary data may begin with a byte that looks
+// like a line end. Declared counts are held against the bytes that are left before anything is allocated.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <set>
 
 #include "levelset/mesh_io_private.h"
 #include "modeling/error.h"
@@ -198,6 +200,94 @@ class Source {
   std::uint64_t row_ = 0;
 };
 
+// Face lists that may hold values of corners: the same number for every corner of every face.
+class CornerLists {
+ public:
+  // Those of the element's properties that are lists of floats, without the ones that mean something else.
+  CornerLists(const Element& element, std::optional<std::size_t> indices,
+              std::optional<std::size_t> texture) {
+    listOf_.resize(element.properties.size(), -1);
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      const Property& property = element.properties[i];
+      if (!property.isList() || i == indices || i == texture) continue;
+      if (property.type != Type::float32 && property.type != Type::float64) continue;
+      listOf_[i] = static_cast<int>(lists_.size());
+      lists_.push_back({{property.name, MeshAttribute::Domain::corner, 0, {}}, {}, true});
+    }
+  }
+
+  // Reads property `i` of the current row; false if it is no such list.
+  bool read(std::size_t i, const Property& property, Source& source) {
+    if (listOf_[i] < 0 || !lists_[static_cast<std::size_t>(listOf_[i])].isWhole) return false;
+    std::vector<float>& row = lists_[static_cast<std::size_t>(listOf_[i])].row;
+    row.resize(source.length(property));
+    for (float& value : row) value = static_cast<float>(source.value(property.type));
+    return true;
+  }
+
+  void closeFace(std::size_t cornerCount) {
+    for (List& list : lists_) {
+      if (!list.isWhole) continue;
+      std::vector<float>& values = list.attribute.values;
+      const std::size_t width = list.row.size() / cornerCount;
+      if (values.empty()) list.attribute.width = static_cast<int>(std::min<std::size_t>(width, kMostWidth));
+      list.isWhole = !list.row.empty() && list.row.size() % cornerCount == 0 &&
+                     width == static_cast<std::size_t>(list.attribute.width);
+      if (list.isWhole)
+        values.insert(values.end(), list.row.begin(), list.row.end());
+      else
+        values = {};
+      list.row.clear();
+    }
+  }
+
+  // Alpha of corners joins their colours. Lists of names that are taken are told apart as "<name>_corner".
+  void addTo(Mesh& mesh) {
+    std::erase_if(lists_, [&](const List& list) {
+      const auto width = static_cast<std::size_t>(list.attribute.width);
+      return !list.isWhole || width == 0 || list.attribute.values.size() != width * mesh.corners.size();
+    });
+    joinAlpha(mesh.corners.size());
+    std::set<std::string> names;
+    for (const MeshAttribute& a : mesh.attributes) names.insert(a.name);
+    for (List& list : lists_) {
+      if (names.contains(list.attribute.name)) list.attribute.name += "_corner";
+      if (names.insert(list.attribute.name).second) mesh.attributes.push_back(std::move(list.attribute));
+    }
+  }
+
+ private:
+  struct List {
+    MeshAttribute attribute;
+    std::vector<float> row;
+    bool isWhole;
+  };
+  static constexpr std::size_t kMostWidth = 1 << 20;
+
+  void joinAlpha(std::size_t cornerCount) {
+    const auto named = [&](const char* name, int width) {
+      return std::ranges::find_if(lists_, [&](const List& list) {
+        return list.attribute.name == name && list.attribute.width == width;
+      });
+    };
+    const auto color = named("color", 3), alpha = named("alpha", 1);
+    if (color == lists_.end() || alpha == lists_.end()) return;
+    std::vector<float> values;
+    values.reserve(4 * cornerCount);
+    for (std::size_t c = 0; c < cornerCount; ++c) {
+      for (std::size_t k = 0; k < 3; ++k) values.push_back(color->attribute.values[3 * c + k]);
+      values.push_back(alpha->attribute.values[c]);
+    }
+    color->attribute.width = 4;
+    color->attribute.values = std::move(values);
+    lists_.erase(alpha);
+  }
+
+  std::vector<List> lists_;
+  // Per property of the element; -1: none.
+  std::vector<int> listOf_;
+};
+
 class PlyReader {
  public:
   explicit PlyReader(const MeshFile& file) : file_(file) {}
@@ -224,6 +314,7 @@ class PlyReader {
     }
     if (mesh_.faceCount() > 0 && mesh_.positions.empty()) file_.fail("has faces but no vertices");
     addTextureCoordinates();
+    if (cornerLists_) cornerLists_->addTo(mesh_);
     return std::move(mesh_);
   }
 
@@ -415,6 +506,7 @@ class PlyReader {
     const auto texture = indexOf(element, {"texcoord"});
     if (element.count > 0 && (!indices || !element.properties[*indices].isList()))
       file_.fail("element face has no list vertex_indices");
+    cornerLists_.emplace(element, indices, texture);
     mesh_.faceStart.reserve(element.count + 1);
     mesh_.corners.reserve(3 * element.count);
     std::vector<double> uv;
@@ -432,11 +524,12 @@ class PlyReader {
         } else if (i == texture && property.isList()) {
           uv.resize(source.length(property));
           for (double& value : uv) value = source.value(property.type);
-        } else {
+        } else if (!cornerLists_->read(i, property, source)) {
           source.skip(property);
         }
       }
       const std::size_t cornerCount = mesh_.corners.size() - firstCorner;
+      cornerLists_->closeFace(cornerCount);
       if (!uv.empty()) {
         if (uv.size() != 2 * cornerCount)
           source.fail(fmt::format("{} texture values for {} corners, expected {}", uv.size(), cornerCount,
@@ -508,6 +601,7 @@ class PlyReader {
   std::uint64_t vertexCount_ = 0;
   std::optional<std::size_t> uvAttribute_;
   CornerUvs cornerUvs_;
+  std::optional<CornerLists> cornerLists_;
   Mesh mesh_;
 };
 
@@ -533,6 +627,31 @@ bool isSingleValued(const Mesh& mesh, const MeshAttribute& attribute, std::vecto
 std::string plyName(std::string name) {
   for (char& c : name) c = c > ' ' && c <= '~' ? c : '_';
   return name.empty() ? "unnamed" : name;
+}
+
+// One list of the faces: components first .. first + count - 1 of a corner attribute.
+struct FaceList {
+  std::string name;
+  const MeshAttribute* attribute;
+  std::size_t first, count;
+};
+
+// Colours as MeshLab has those of wedges, three per corner; it would misread four.
+std::vector<FaceList> faceLists(const Mesh& mesh, const MeshAttribute* uv, bool uvPerVertex) {
+  std::vector<FaceList> lists;
+  if (uv && !uvPerVertex) lists.push_back({"texcoord", uv, 0, 2});
+  for (const MeshAttribute& a : mesh.attributes) {
+    if (a.domain != MeshAttribute::Domain::corner || &a == uv || a.width < 1) continue;
+    std::string name = plyName(a.name);
+    if (name == "texcoord" || name == "vertex_indices" || name == "vertex_index") name += "_corner";
+    if (name == "color" && a.width == 4) {
+      lists.push_back({"color", &a, 0, 3});
+      lists.push_back({"alpha", &a, 3, 1});
+    } else {
+      lists.push_back({name, &a, 0, static_cast<std::size_t>(a.width)});
+    }
+  }
+  return lists;
 }
 
 class ByteWriter {
@@ -604,8 +723,10 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
   out.text(fmt::format("element face {}\nproperty list {} {} vertex_indices\n", mesh.faceCount(),
                        mostCorners < 256 ? "uchar" : "uint",
                        mesh.positions.size() < 0x80000000u ? "int" : "uint"));
-  if (uv && !uvPerVertex)
-    out.text(fmt::format("property list {} float texcoord\n", mostCorners < 128 ? "uchar" : "uint"));
+  const std::vector<FaceList> lists = faceLists(mesh, uv, uvPerVertex);
+  const auto isShort = [&](const FaceList& list) { return mostCorners * list.count < 256; };
+  for (const FaceList& list : lists)
+    out.text(fmt::format("property list {} float {}\n", isShort(list) ? "uchar" : "uint", list.name));
   out.text("end_header\n");
 
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
@@ -631,13 +752,17 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
     else
       out.put(static_cast<std::uint32_t>(face.size()));
     for (const std::uint32_t v : face) out.put(v);
-    if (!uv || uvPerVertex) continue;
-    if (mostCorners < 128)
-      out.put(static_cast<std::uint8_t>(2 * face.size()));
-    else
-      out.put(static_cast<std::uint32_t>(2 * face.size()));
-    for (std::uint32_t c = mesh.faceStart[f]; c < mesh.faceStart[f + 1]; ++c)
-      for (std::size_t k = 0; k < 2; ++k) out.put(uv->values[2 * std::size_t{c} + k]);
+    for (const FaceList& list : lists) {
+      if (isShort(list))
+        out.put(static_cast<std::uint8_t>(list.count * face.size()));
+      else
+        out.put(static_cast<std::uint32_t>(list.count * face.size()));
+      for (std::size_t c = mesh.faceStart[f]; c < mesh.faceStart[f + 1]; ++c) {
+        const float* values =
+            list.attribute->values.data() + c * static_cast<std::size_t>(list.attribute->width) + list.first;
+        for (std::size_t k = 0; k < list.count; ++k) out.put(values[k]);
+      }
+    }
   }
 }
 

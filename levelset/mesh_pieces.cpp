@@ -17,8 +17,7 @@
 #include <memory>
 #include <numeric>
 
-#include "levelset/carve.h"
-#include "levelset/cut_source.h"
+#include "levelset/carved_pieces.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
 
@@ -294,27 +293,22 @@ void findNeighbours(std::vector<MeshPiece>& pieces, std::vector<InnerTriangle> i
 
 }  // namespace
 
-MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progress& progress) {
+namespace detail {
+
+void requireFlatKnives(const MeshCutOptions& options) {
   require(std::isfinite(options.minVolume) && options.minVolume >= 0,
           fmt::format("cut: minVolume must be finite and >= 0, got {}", options.minVolume));
   require(std::isfinite(options.kerf) && options.kerf >= 0,
           fmt::format("cut: kerf must be finite and >= 0, got {}", options.kerf));
+  cutPlanes(options.planes);
+  cellPoints(options.cells);
+}
+
+MeshPieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts,
+                    const MeshCutOptions& options, const Progress& progress) {
   const std::vector<CutPlane> planes = cutPlanes(options.planes);
   const std::vector<Vec3d> cells = cellPoints(options.cells);
   const double halfKerf = double(options.kerf) / 2;
-  CutSource source(mesh);
-  std::vector<detail::Carved::Part> carvedParts(1);
-  if (options.rough.empty() && options.solids.empty()) {
-    carvedParts[0].triangles.resize(source.triangles().size());
-    std::iota(carvedParts[0].triangles.begin(), carvedParts[0].triangles.end(), 0u);
-  } else {
-    progress.begin("knives");
-    const auto sheets = detail::knifeSheets(options, source);
-    detail::Carved carved = detail::carve(source.positions(), source.triangles(), sheets, progress);
-    carvedParts = std::move(carved.parts);
-    source.refine(std::move(carved));
-  }
-
   progress.begin("cut");
   std::vector<Family> families(std::max<std::size_t>(cells.size(), 1));
   parallelFor(
@@ -324,7 +318,7 @@ MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progre
           Family& family = families[i];
           family.splitter = std::make_unique<SolidSplitter>(source.positions(), source.triangles(), cells,
                                                             source.tolerance());
-          for (const auto& part : carvedParts)
+          for (const Carved::Part& part : parts)
             family.parts.push_back({family.splitter->solidOf(part.triangles), {part.sides}});
           if (!cells.empty()) keepCell(family, cells, std::uint32_t(i), halfKerf);
           for (const CutPlane& plane : planes) {
@@ -375,6 +369,25 @@ MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progre
   }
   findNeighbours(result.pieces, std::move(inner));
   return result;
+}
+
+}  // namespace detail
+
+MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progress& progress) {
+  detail::requireFlatKnives(options);
+  CutSource source(mesh);
+  std::vector<detail::Carved::Part> parts(1);
+  if (options.rough.empty() && options.solids.empty()) {
+    parts[0].triangles.resize(source.triangles().size());
+    std::iota(parts[0].triangles.begin(), parts[0].triangles.end(), 0u);
+  } else {
+    progress.begin("knives");
+    const auto sheets = detail::knifeSheets(options, source);
+    detail::Carved carved = detail::carve(source.positions(), source.triangles(), sheets, progress);
+    parts = std::move(carved.parts);
+    source.refine(std::move(carved));
+  }
+  return detail::piecesOf(source, parts, options, progress);
 }
 
 }  // namespace nephele

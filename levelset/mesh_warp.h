@@ -20,8 +20,9 @@ enum class Alignment { none, similarity, lattice };
 
 /// fast: the warp field as it is. balanced: relaxed where it folds over or stretches, for a few rounds. best:
 /// for many, from several starts until there is hardly any fold. Of all maps tried, the best that is no worse
-/// than closest points in flips, collapsed triangles, stretch and coverage (transfer_quality.h) is kept; if
-/// none is, one that has fewer bad triangles of both kinds and no less coverage.
+/// than closest points in flips, collapsed triangles, stretch and coverage (transfer_quality.h) is kept, if
+/// possible one without triangles that span the reference (surface_relaxation.h); if none is, one that has
+/// fewer bad triangles of both kinds and no less coverage.
 enum class WarpQuality { fast, balanced, best };
 
 struct MeshWarpOptions {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "modeling/mesh.h"
@@ -29,6 +30,8 @@ class TextWriter {
   TextWriter& integer(std::uint64_t value);
 
   const std::string& kept() const { return buffer_; }
+  /// What was kept; the writer is empty then.
+  std::string take() { return std::exchange(buffer_, {}); }
 
  private:
   static constexpr std::size_t kFlushAt = 1 << 16;

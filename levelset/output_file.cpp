@@ -129,6 +129,15 @@ void discardAllOutputs() noexcept {
     ::unlink(node->path.c_str());
     node->state = State::discarded;
   }
+  // Folders, once they are empty; a path that was a file is gone.
+  for (OpenTemporary* node = openTemporaries.load(); node; node = node->next)
+    if (node->state == State::discarded) ::rmdir(node->path.c_str());
+}
+
+detail::OpenOutput::OpenOutput(const std::string& path) : entry_(enlist(path)) {}
+
+detail::OpenOutput::~OpenOutput() {
+  strike(entry_);
 }
 
 }  // namespace nephele

@@ -37,7 +37,24 @@ class OutputFile {
 /// renamed before it are removed. @throws Error naming the path.
 void commitTogether(std::span<OutputFile* const> outputs);
 
-/// Unlinks every temporary that is open now. Safe to call from a signal handler.
+/// Unlinks every temporary that is open now, and removes those that are folders. Safe to call from a signal
+/// handler.
 void discardAllOutputs() noexcept;
+
+namespace detail {
+
+/// A file or folder that `discardAllOutputs` removes as long as this lives: nothing else is done to it.
+class OpenOutput {
+ public:
+  explicit OpenOutput(const std::string& path);
+  ~OpenOutput();
+  OpenOutput(const OpenOutput&) = delete;
+  OpenOutput& operator=(const OpenOutput&) = delete;
+
+ private:
+  void* entry_;
+};
+
+}  // namespace detail
 
 }  // namespace nephele

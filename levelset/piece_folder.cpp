@@ -3,12 +3,17 @@
 #include "levelset/piece_folder.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <system_error>
 
 #include "levelset/piece_files.h"
 #include "modeling/error.h"
@@ -42,26 +47,53 @@ PieceFolder::PieceFolder(std::string path) : path_(std::move(path)) {
   std::error_code error;
   fs::path folder = fs::absolute(path_).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
-  if (fs::exists(folder, error)) {
+  if (fs::symlink_status(folder, error).type() != fs::file_type::not_found) {
     require(fs::is_directory(folder, error),
             fmt::format("cannot write pieces to {}: it is no folder", path_));
     if (fs::exists(pathOf(kList), error)) listed_ = filesListed(pathOf(kList));
     return;
   }
-  for (fs::path p = folder; !fs::exists(p, error) && p.has_relative_path(); p = p.parent_path())
-    made_.insert(made_.begin(), p.string());
-  for (std::size_t i = 0; i < made_.size(); ++i)
-    if (!fs::create_directory(made_[i], error) && error) {
-      for (std::size_t k = i; k-- > 0;) fs::remove(made_[k]);
-      throw Error(fmt::format("cannot make the folder {}: {}", path_, error.message()));
-    }
+  target_ = folder.string();
+  makeFolder();
+}
+
+void PieceFolder::makeFolder() {
+  std::error_code error;
+  const fs::path folder(target_), parent = folder.parent_path();
+  const auto failed = [&] {
+    for (std::size_t k = made_.size(); k-- > 0;) ::rmdir(made_[k].c_str());
+    made_.clear();
+    return Error(fmt::format("cannot make the folder {}: {}", path_, error.message()));
+  };
+  std::vector<std::string> missing;
+  for (fs::path p = parent; !fs::exists(p, error) && p.has_relative_path(); p = p.parent_path())
+    missing.insert(missing.begin(), p.string());
+  for (const std::string& name : missing) {
+    if (!fs::create_directory(name, error) && error) throw failed();
+    made_.push_back(name);
+  }
+  static std::atomic<unsigned> serial{0};
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    staging_ =
+        (parent / fmt::format(".{}.{}-{}", folder.filename().string().substr(0, 100), ::getpid(), serial++))
+            .string();
+    openStaging_ = std::make_unique<OpenOutput>(staging_);
+    if (::mkdir(staging_.c_str(), 0777) == 0) return;
+    error.assign(errno, std::generic_category());
+    openStaging_.reset();
+    if (error != std::errc::file_exists) break;
+  }
+  throw failed();
 }
 
 PieceFolder::~PieceFolder() {
   outputs_.clear();
-  std::error_code ignored;
-  if (!committed_)
-    for (std::size_t i = made_.size(); i-- > 0;) fs::remove(made_[i], ignored);
+  if (committed_) return;
+  if (!staging_.empty()) {
+    for (const std::string& name : names_) ::unlink((fs::path(staging_) / name).c_str());
+    ::rmdir(staging_.c_str());
+  }
+  for (std::size_t i = made_.size(); i-- > 0;) ::rmdir(made_[i].c_str());
 }
 
 std::string PieceFolder::pathOf(const std::string& name) const {
@@ -69,6 +101,10 @@ std::string PieceFolder::pathOf(const std::string& name) const {
 }
 
 void PieceFolder::expect(const std::vector<std::string>& names) {
+  names_ = names;
+  outputs_.resize(names.size());
+  openFiles_.resize(names.size());
+  if (!staging_.empty()) return;
   const std::set<std::string> listed(listed_.begin(), listed_.end()), wanted(names.begin(), names.end());
   for (const auto& entry : fs::directory_iterator(path_)) {
     const std::string name = entry.path().filename().string();
@@ -79,17 +115,27 @@ void PieceFolder::expect(const std::vector<std::string>& names) {
                         "folder",
                         path_, name, kList));
   }
-  names_ = names;
-  outputs_.resize(names.size());
 }
 
-const std::string& PieceFolder::temporary(std::size_t index) {
+std::string PieceFolder::temporary(std::size_t index) {
+  if (!staging_.empty()) {
+    std::string path = (fs::path(staging_) / names_[index]).string();
+    openFiles_[index] = std::make_unique<OpenOutput>(path);
+    return path;
+  }
   outputs_[index] = std::make_unique<OutputFile>(pathOf(names_[index]));
   return outputs_[index]->temporaryPath();
 }
 
 void PieceFolder::commit() {
   std::error_code ignored;
+  if (!staging_.empty()) {
+    if (std::rename(staging_.c_str(), target_.c_str()) != 0)
+      throw Error(
+          fmt::format("cannot make the folder {}: {}", path_, std::generic_category().message(errno)));
+    committed_ = true;
+    return;
+  }
   // While its files go, the old list still names them, so that what is missing is missed. (Some file systems
   // wait for the disk where a file is replaced, not where one is new.)
   for (const std::string& file : listed_)

@@ -10,10 +10,12 @@ namespace nephele::detail {
 
 /// A folder that is filled with files that belong together, see `writePieces`.
 ///
-/// The destructor leaves everything as it was unless `commit` was called.
+/// A folder that is not there is filled under a temporary name beside its own and appears whole; in one that
+/// is there, each file has a temporary name of its own. The destructor leaves everything as it was unless
+/// `commit` was called.
 class PieceFolder {
  public:
-  /// Makes the folder if it is not there. @throws Error naming the path.
+  /// @throws Error naming the path.
   explicit PieceFolder(std::string path);
   ~PieceFolder();
   PieceFolder(const PieceFolder&) = delete;
@@ -21,8 +23,9 @@ class PieceFolder {
 
   /// Says which files there will be; the last one lists them all. @throws Error if others are in the way.
   void expect(const std::vector<std::string>& names);
-  /// Where to write the file of that index. Safe to call from many threads, once for each.
-  const std::string& temporary(std::size_t index);
+  /// Where to write the file of that index; it may be there, empty. Safe to call from many threads, once for
+  /// each.
+  std::string temporary(std::size_t index);
   /// Removes what the folder's old list names, and puts the new files in place.
   void commit();
 
@@ -31,9 +34,14 @@ class PieceFolder {
 
  private:
   std::string pathOf(const std::string& name) const;
+  void makeFolder();
 
-  std::string path_;
-  /// Folders that were not there, outermost first.
+  std::string path_, target_;
+  /// What the folder is called until it is complete; empty if it was there.
+  std::string staging_;
+  std::unique_ptr<OpenOutput> openStaging_;
+  std::vector<std::unique_ptr<OpenOutput>> openFiles_;
+  /// Folders around it that were not there, outermost first.
   std::vector<std::string> made_;
   /// Files that the list of an earlier cut names.
   std::vector<std::string> listed_;

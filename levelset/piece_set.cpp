@@ -15,7 +15,9 @@
 #include <set>
 
 #include "levelset/grid_field.h"
+#include "levelset/level_set_pieces.h"
 #include "levelset/marching_cubes.h"
+#include "levelset/mesh_to_level_set.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
 
@@ -179,8 +181,27 @@ void findNeighbours(std::vector<NamedPiece>& pieces) {
   setNeighbours(pieces, areas);
 }
 
+/// The same knives for a level set. Of equal solids there is one.
+LevelSetCutOptions levelSetOptions(const BrickGrid& level, const MeshCutOptions& options,
+                                   const Progress& progress) {
+  LevelSetCutOptions result{
+      .planes = options.planes, .cells = options.cells, .kerf = options.kerf, .rough = options.rough};
+  for (std::size_t i = 0; i < options.solids.size(); ++i) {
+    const Mesh& solid = options.solids[i];
+    std::size_t same = 0;
+    while (options.solids[same].positions != solid.positions || options.solids[same].corners != solid.corners)
+      ++same;
+    result.knives.push_back(same < i ? result.knives[same]
+                                     : solidKnife(solid, double(level.voxelSize), options.kerf, progress));
+  }
+  if (options.minVolume > 0) result.minVolume = options.minVolume;
+  return result;
+}
+
 Result cutPart(const CutPart& part, const MeshCutOptions& options, const Progress& progress) {
-  MeshPieces cut = cutMesh(part.mesh, options, progress);
+  MeshPieces cut = part.level ? cutLevelSet(*part.level, part.mesh,
+                                            levelSetOptions(*part.level, options, progress), progress)
+                              : cutMesh(part.mesh, options, progress);
   Result result{.slivers = cut.slivers, .sliverVolume = cut.sliverVolume};
   const MassProperties whole = massProperties(part.mesh);
   result.volume = whole.volume;
@@ -279,7 +300,7 @@ Result cutLevel(const CutPart& part, CutOptions options, const Progress& progres
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           NamedPiece& piece = result.pieces[i];
-          piece.level = std::move(cut.pieces[i].level);
+          piece.level = cut.pieces[i].level.toBricks();
           piece.code = std::move(cut.pieces[i].code);
           piece.cell = cut.pieces[i].cell;
           piece.mesh = marchingCubes(*piece.level);
@@ -309,6 +330,12 @@ void checkClosed(std::vector<NamedPiece>& pieces, const Progress& progress) {
 }
 
 }  // namespace
+
+Knife solidKnife(const Mesh& solid, double voxelSize, float kerf, const Progress& progress) {
+  const double band = 0.5 * double(kerf) + 4 * voxelSize;
+  return {
+      meshDistance(solid, {.voxelSize = voxelSize, .exteriorBand = band, .interiorBand = band}, progress)};
+}
 
 PieceSet cutParts(std::span<const CutPart> parts, const MeshCutOptions& options, const Progress& progress) {
   requireNames(parts);

@@ -19,9 +19,11 @@ struct CutPart {
   /// Of a piece of an earlier cut: what that was cut from, or nothing. Such a part keeps its name where no
   /// knife touches it, and is the parent of its pieces.
   std::optional<std::string> parent{};
-  /// Closed. Also where there is a level set: then it is the mesh of that.
+  /// Closed. Also where there is a level set: then it is the mesh of that, for `cutParts` that of
+  /// `marchingTetrahedra`.
   Mesh mesh{};
-  /// Positive inside, with a band of at least 3 voxels. Needed by `cutPartsAsLevelSets`.
+  /// Positive inside, with a band of at least 3 voxels. Needed by `cutPartsAsLevelSets`; `cutParts` cuts it,
+  /// if there is one, in place of the mesh.
   std::shared_ptr<const BrickGrid> level{};
 };
 
@@ -52,11 +54,16 @@ struct PieceSet {
   double sliverVolume = 0.0;
 };
 
-/// Cuts every part by the same knives, exactly, see `cutMesh`. Pieces come part by part. `piece`, cut,
+/// The inside of a closed mesh as a knife for level sets of that voxel size: its signed distance as far as a
+/// cut of that width needs it. @throws Error as `meshDistance`.
+Knife solidKnife(const Mesh& solid, double voxelSize, float kerf, const Progress& progress = silent());
+
+/// Cuts every part by the same knives, exactly, see `cutMesh`, and `cutLevelSet` for parts with a level set,
+/// where minVolume 0 stands for one voxel. Pieces come part by part. `piece`, cut,
 /// becomes `piece_0001`, `piece_0002` ...; a part of an earlier cut that no knife touches stays as it is,
 /// name and parent included. Neighbours are found among the pieces of all parts, by inner faces that are the
 /// same.
-/// @throws Error as `cutMesh` does, naming the part where there are several, or if there are no parts or two
+/// @throws Error as these do, naming the part where there are several, or if there are no parts or two
 /// have one name; Cancelled.
 PieceSet cutParts(std::span<const CutPart> parts, const MeshCutOptions& options,
                   const Progress& progress = silent());

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
-#include "levelset/brick_grid.h"
+#include "levelset/piece_level.h"
 #include "modeling/knives.h"
 #include "modeling/progress.h"
 
@@ -36,7 +34,7 @@ struct Piece {
   std::optional<std::uint32_t> cell;
   /// min(shape, +-knives - kerf / 2, distance to the cell's sides) within the band of its surface, the band's
   /// ends beyond; positive inside. Other pieces of the same code are outside of it.
-  std::shared_ptr<BrickGrid> level;
+  PieceLevel level;
   /// Of its marching cubes mesh, world units cubed.
   double volume = 0.0;
 };

@@ -188,6 +188,36 @@ void pairAroundEdge(const SolidSplitter& splitter, const std::vector<SolidTriang
   }
 }
 
+/// Without pairs of triangles that are the same from either side: where points coincide, a flat cut may have
+/// such a pair between them. `suspects` are in the order of their numbers, some more than once.
+std::vector<SolidTriangle> withoutFlakes(const std::vector<SolidTriangle>& triangles,
+                                         std::vector<std::uint32_t> suspects) {
+  suspects.erase(std::unique(suspects.begin(), suspects.end()), suspects.end());
+  const auto sorted = [&](std::uint32_t t) {
+    TriangleIndices v = triangles[t].vertices;
+    std::sort(v.begin(), v.end());
+    return v;
+  };
+  /// From the lowest vertex to the next higher, or the other way round.
+  const auto runsUp = [&](std::uint32_t t) {
+    const TriangleIndices &v = triangles[t].vertices, s = sorted(t);
+    return v[std::size_t(std::find(v.begin(), v.end(), s[0]) - v.begin() + 1) % 3] == s[1];
+  };
+  std::stable_sort(suspects.begin(), suspects.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return sorted(a) < sorted(b); });
+  std::vector<bool> isDropped(triangles.size());
+  for (std::size_t i = 0; i + 1 < suspects.size(); ++i) {
+    const std::uint32_t a = suspects[i], b = suspects[i + 1];
+    if (isDropped[a] || sorted(a) != sorted(b) || runsUp(a) == runsUp(b)) continue;
+    isDropped[a] = isDropped[b] = true;
+  }
+  std::vector<SolidTriangle> left;
+  left.reserve(triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (!isDropped[t]) left.push_back(triangles[t]);
+  return left;
+}
+
 /// Whether a ray from `p` meets the shell an odd number of times. Its direction is one that no model has.
 bool isInside(const SolidSplitter& splitter, const Shell& shell, const Vec3d& p) {
   const auto sheared = [&](std::uint32_t v) {
@@ -225,6 +255,16 @@ std::vector<Shell> shellsOf(const SolidSplitter& splitter, const std::vector<Sol
   std::sort(halves.begin(), halves.end(), [](const Half& a, const Half& b) {
     return a.key != b.key ? a.key < b.key : a.isForward != b.isForward ? a.isForward : a.corner < b.corner;
   });
+  std::vector<std::uint32_t> crowded;
+  for (std::size_t i = 0, end = 0; i < halves.size(); i = end) {
+    for (end = i; end < halves.size() && halves[end].key == halves[i].key;) ++end;
+    for (std::size_t k = i; k < end && end - i > 2; ++k) crowded.push_back(halves[k].corner / 3);
+  }
+  if (!crowded.empty()) {
+    std::sort(crowded.begin(), crowded.end());
+    auto left = withoutFlakes(triangles, std::move(crowded));
+    if (left.size() < triangles.size()) return shellsOf(splitter, left);
+  }
   DisjointSets parts(triangles.size()), fans(halves.size());
   for (std::size_t i = 0, end = 0; i < halves.size(); i = end) {
     std::size_t middle = i;

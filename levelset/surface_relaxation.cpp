@@ -11,6 +11,11 @@
 // give up, and a fold shrinks to few of them. A low limit gives up too early where a map without folds
 // exists.
 //
+// Triangles that give up may also tear: a handle that has nowhere to go becomes a row of triangles that span
+// the reference, which smears whatever is on it. So sides that span a fifth of the reference resist like
+// springs, without a limit, and the jump spreads over as many triangles as it needs. Not from the start:
+// images that tear first find the places where they cover the reference, which springs keep them from.
+//
 // A few smoothing rounds first (Dirichlet energy, implicit Euler) open most folds where the shapes agree;
 // many of them shrink to a point what does not wrap around the reference.
 //
@@ -40,6 +45,10 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Vector4 = Eigen::Vector4d;
 
 constexpr std::size_t kGrain = 512;
+/// A side resists whose image is longer than this share of the reference and than so many times itself.
+constexpr double kTear = 0.2, kGrowth = 3;
+/// It is torn at this many times that length.
+constexpr double kTorn = 1.5;
 
 /// Unit normals of a reference, smooth across edges.
 class SmoothNormals {
@@ -73,6 +82,11 @@ class SmoothNormals {
   std::vector<Vec3d> normals_;
 };
 
+/// From where on the image of a side resists.
+double tearLength(const ExactDistance& reference, double restLength) {
+  return std::max(kTear * reference.size(), kGrowth * restLength);
+}
+
 /// Two directions that span the plane across `n`.
 struct Tangents {
   Vec3d u, v;
@@ -92,6 +106,8 @@ struct Triangle {
   /// Gradients of the corners' weights in the plane of the triangle at rest.
   std::array<Eigen::Vector2d, 3> gradient;
   double area;  ///< Share of the whole.
+  /// Of each side, from corner i to the next: 1 / the square of the length from which its image resists.
+  std::array<double, 3> perTear;
 };
 
 /// Images and what belongs to them.
@@ -102,7 +118,7 @@ struct State {
 /// The energy of a triangle per area, as a function of half = |J|^2 / 2 and d = det J.
 struct Energy {
   bool isHarmonic;  ///< `half` alone.
-  double epsilon, areaWeight, limit;
+  double epsilon, areaWeight, limit, tearWeight;
 
   /// chi and its first two derivatives.
   struct Barrier {
@@ -118,6 +134,8 @@ struct Energy {
   double value(double half, double d) const {
     return isHarmonic ? half : limit * std::log1p(top(half, d) / barrier(d).c / limit);
   }
+  /// Of a side whose square is `s` times that from which it resists.
+  double tear(double s) const { return s > 1 ? tearWeight * (s - 1) * (s - 1) : 0.0; }
 };
 
 class Relaxation {
@@ -142,6 +160,12 @@ class Relaxation {
       Triangle triangle = restShape(object, t, scale);
       if (!(triangle.area > 0)) continue;
       triangle.area /= reference.area();
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Vec3d side = object.positions[object.corners[3 * t + (i + 1) % 3]] -
+                           object.positions[object.corners[3 * t + i]];
+        const double tear = tearLength(reference, scale * length(side));
+        triangle.perTear[i] = 1 / (tear * tear);
+      }
       for (std::size_t i = 0; i < 3; ++i) triangle.vertex[i] = vertexOf_[object.corners[3 * t + i]];
       triangles_.push_back(triangle);
     }
@@ -159,7 +183,8 @@ class Relaxation {
       const int newton = round - options.smoothingRounds;
       const double lowered = std::pow(kLastEpsilon / kFirstEpsilon, double(newton) / lowering);
       const Energy energy{newton < 0, std::max(kLastEpsilon, kFirstEpsilon * lowered), options.areaWeight,
-                          newton < strict ? options.limit : options.lastLimit};
+                          newton < strict ? options.limit : options.lastLimit,
+                          newton < options.resistsFrom * options.rounds ? 0 : kTearWeight};
       const double before = total(state_, energy);
       assemble(energy);
       const double after = descend(energy, before);
@@ -175,6 +200,7 @@ class Relaxation {
 
  private:
   static constexpr double kFirstEpsilon = 0.5, kLastEpsilon = 0.05;
+  static constexpr double kTearWeight = 10;
   /// The last rounds end when one gains less than this share.
   static constexpr double kSettled = 1e-4;
   /// Length of a smoothing step in time, in units of the reference's area.
@@ -242,6 +268,14 @@ class Relaxation {
     return j;
   }
 
+  static Vec3d side(const State& state, const Triangle& t, std::size_t i) {
+    return state.x[t.vertex[(i + 1) % 3]] - state.x[t.vertex[i]];
+  }
+  static double tearing(const State& state, const Triangle& t, std::size_t i) {
+    const Vec3d e = side(state, t, i);
+    return dot(e, e) * t.perTear[i];
+  }
+
   double total(const State& state, const Energy& energy) const {
     // In pieces that do not depend on the number of threads.
     std::vector<double> parts((triangles_.size() + kGrain - 1) / kGrain);
@@ -250,7 +284,9 @@ class Relaxation {
         double sum = 0;
         for (std::size_t k = p * kGrain; k < std::min(triangles_.size(), (p + 1) * kGrain); ++k) {
           const Matrix2d j = jacobian(state, triangles_[k]);
-          sum += triangles_[k].area * energy.value(0.5 * j.squaredNorm(), j.determinant());
+          double value = energy.value(0.5 * j.squaredNorm(), j.determinant());
+          for (std::size_t i = 0; i < 3; ++i) value += energy.tear(tearing(state, triangles_[k], i));
+          sum += triangles_[k].area * value;
         }
         parts[p] = sum;
       }
@@ -360,12 +396,35 @@ class Relaxation {
             v * t.gradient[i][1];
       }
     }
-    const Vector6 g = share * chain.transpose() * gradient;
-    const Matrix6 h = share * chain.transpose() * hessian * chain;
+    Vector6 g = share * chain.transpose() * gradient;
+    Matrix6 h = share * chain.transpose() * hessian * chain;
+    if (energy.tearWeight > 0)
+      for (std::size_t i = 0; i < 3; ++i) addTear(t, i, energy, g, h);
     std::size_t next = 0;
     for (int a = 0; a < 6; ++a) out[next++] = g[a];
     for (int a = 0; a < 6; ++a)
       for (int b = 0; b <= a; ++b) out[next++] = h(a, b);
+  }
+
+  /// Adds what side `i` resists with; as for all terms, the Hessian without its negative directions.
+  void addTear(const Triangle& t, std::size_t i, const Energy& energy, Vector6& gradient,
+               Matrix6& hessian) const {
+    const double s = tearing(state_, t, i);
+    if (!(s > 1)) return;
+    const Vec3d e = side(state_, t, i);
+    Eigen::Matrix<double, 3, 6> chain = Eigen::Matrix<double, 3, 6>::Zero();
+    for (const auto& [corner, sign] : {std::pair{i, -1.0}, std::pair{(i + 1) % 3, 1.0}}) {
+      const Tangents at(state_.normal[t.vertex[corner]]);
+      for (int k = 0; k < 3; ++k) {
+        chain(k, int(2 * corner)) = sign * at.u[k];
+        chain(k, int(2 * corner) + 1) = sign * at.v[k];
+      }
+    }
+    const Vector6 bySide = chain.transpose() * Eigen::Vector3d(e.x, e.y, e.z);
+    const double weight = t.area * energy.tearWeight, by = t.perTear[i];
+    gradient += weight * 4 * (s - 1) * by * bySide;
+    hessian +=
+        weight * (4 * (s - 1) * by * chain.transpose() * chain + 8 * by * by * bySide * bySide.transpose());
   }
 
   Eigen::VectorXd solve() {
@@ -402,6 +461,24 @@ class Relaxation {
 
 }  // namespace
 
+std::size_t countTears(const ExactDistance& reference, const Mesh& object, std::span<const Vec3d> images) {
+  require(images.size() == object.positions.size(),
+          fmt::format("tears: {} images for {} positions", images.size(), object.positions.size()));
+  require(object.isTriangles(), "tears: the object must be triangulated");
+  const double area = surfaceArea(object), scale = area > 0 ? std::sqrt(reference.area() / area) : 0;
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < object.faceCount(); ++t) {
+    bool isTorn = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t a = object.corners[3 * t + i], b = object.corners[3 * t + (i + 1) % 3];
+      const double rest = scale * length(object.positions[b] - object.positions[a]);
+      isTorn |= length(images[b] - images[a]) > kTorn * tearLength(reference, rest);
+    }
+    count += isTorn;
+  }
+  return count;
+}
+
 std::vector<Vec3d> relaxImages(const ExactDistance& reference, const Mesh& object,
                                std::span<const Vec3d> images, const RelaxationOptions& options,
                                const Progress& progress) {
@@ -414,6 +491,8 @@ std::vector<Vec3d> relaxImages(const ExactDistance& reference, const Mesh& objec
           fmt::format("relaxation: limits must be > 0, got {} and {}", options.limit, options.lastLimit));
   require(options.areaWeight > 0,
           fmt::format("relaxation: areaWeight must be > 0, got {}", options.areaWeight));
+  require(options.resistsFrom >= 0 && options.resistsFrom <= 1,
+          fmt::format("relaxation: resistsFrom must be 0 to 1, got {}", options.resistsFrom));
   Relaxation relaxation(reference, object, images);
   relaxation.run(options, progress);
   return relaxation.images();

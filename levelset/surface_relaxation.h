@@ -18,7 +18,15 @@ struct RelaxationOptions {
   /// Energy (1 + areaWeight for an isometry) beyond which a triangle counts less and less: in the first
   /// three quarters of the rounds, and in the last one. Low limits give up more triangles for the rest, > 0.
   double limit = 30, lastLimit = 5;
+  /// From this share of the rounds on triangles resist spanning the reference, 0 to 1. Until then they may
+  /// tear, which finds places where they cover it.
+  double resistsFrom = 0.5;
 };
+
+/// How many of the object's triangles are torn: the image of a side is longer than 0.3 times the reference's
+/// longest side and than 4.5 times the side itself, once the object has the reference's area.
+/// @throws Error if the counts differ or `object` has other faces than triangles.
+std::size_t countTears(const ExactDistance& reference, const Mesh& object, std::span<const Vec3d> images);
 
 /// Moves images along the surface of `reference` so that triangles of the object keep their shape.
 ///
@@ -27,7 +35,8 @@ struct RelaxationOptions {
 ///   area * limit * log(1 + f / limit),   f = (|J|^2 / 2 + areaWeight (det^2 + 1) / 2) / chi(det),
 ///   chi = (det + sqrt(eps^2 + det^2)) / 2,
 /// J the map of a triangle in the tangent plane of the reference: angles and areas, each least where the map
-/// is an isometry, over a barrier against fold-over that is lowered (eps) as the rounds go on.
+/// is an isometry, over a barrier against fold-over that is lowered (eps) as the rounds go on. Sides whose
+/// images span more than a fifth of the reference (and three times themselves) resist on top.
 /// Coincident positions stay together. Returns points of the reference. Cost: about 0.3 s per round for
 /// 60 000 triangles on one core. The same at any thread count.
 /// @throws Error if an option is out of its range or the counts differ; Cancelled.

@@ -47,18 +47,24 @@ class LayerNode final : public FieldNode<float> {
         band_{-step.reach - kOuterShare * step.margin, step.margin},
         bound_(step.bound),
         noiseBound_(step.layer->noise.range(Box::everywhere()).magnitude()),
-        amplitudeVaries_(!step.layer->amplitude.range(Box::everywhere()).isPoint()) {
+        amplitudeVaries_(!step.layer->amplitude.range(Box::everywhere()).isPoint()),
+        startsFromLevel_(options.bake && surface_ == level_) {
     projection_.steps = options.newtonSteps;
     projection_.voxel = options.voxelSize;
-    if (step.index == 0) projection_.fallback = options.closestPoint;
+    projection_.fallback = options.closestPoint;
   }
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
     Scratch::Frame frame(scratch);
     float* level = frame.lane();
-    level_->eval(points, {level}, scratch);
+    const BlockLanes<3> slope = frame.lanes<3>();
+    if (startsFromLevel_)
+      level_->evalGrad(points, {level}, slope, scratch);
+    else
+      level_->eval(points, {level}, scratch);
 
     const BlockLanes<3> start = frame.lanes<3>();
+    float* startLevel = frame.lane();
     std::array<std::uint8_t, kBlockSize> origin;
     int count = 0;
     for (int i = 0; i < points.count; ++i) {
@@ -67,14 +73,19 @@ class LayerNode final : public FieldNode<float> {
       start[0][count] = points.x[i];
       start[1][count] = points.y[i];
       start[2][count] = points.z[i];
+      // In place: count <= i.
+      startLevel[count] = level[i];
+      if (startsFromLevel_)
+        for (float* lane : slope) lane[count] = lane[i];
       origin[count++] = static_cast<std::uint8_t>(i);
     }
     if (count == 0) return;
 
+    const detail::KnownStart known{startLevel, slope};
     const BlockLanes<3> end = frame.lanes<3>();
     float* residual = frame.lane();
-    detail::projectToSurface(*surface_, scratch.pointBlock(start, count), end, residual, projection_,
-                             scratch);
+    detail::projectToSurface(*surface_, scratch.pointBlock(start, count), end, residual, projection_, scratch,
+                             startsFromLevel_ ? &known : nullptr);
     const PointBlock surfacePoints = scratch.pointBlock(end, count);
 
     float* noise = frame.lane();
@@ -151,13 +162,14 @@ class LayerNode final : public FieldNode<float> {
   Interval band_;
   float bound_, noiseBound_;
   bool amplitudeVaries_;
+  /// Whether the level's gradient is worth asking for at once: most points that are sampled lie in the band.
+  bool startsFromLevel_;
   SurfacePointOptions projection_;
 };
 
 }  // namespace
 
-ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
-                   const CumuloOptions& options) {
+ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers, CumuloOptions options) {
   require(options.voxelSize > 0 && std::isfinite(options.voxelSize),
           "cumulo: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(options.newtonSteps >= 1 && options.newtonSteps <= 64,
@@ -179,6 +191,7 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
     step.reach = displacementBound(layers, i);
     step.margin = options.margin ? options.margin(i) : 4 * options.voxelSize;
     step.displacement = ScalarField(std::make_shared<LayerNode>(step, before, options));
+    options.closestPoint.reset();
     if (options.bake) {
       const CumuloSampled sampled = options.bake(step);
       before = {sampled.displacement.node(), layer.amplitude.node()};

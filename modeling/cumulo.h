@@ -56,7 +56,8 @@ struct CumuloOptions {
   /// exact and slow: (1 + 7 k)^M evaluations of the base per value for k steps and M layers.
   std::function<CumuloSampled(const CumuloStep&)> bake{};
   /// The exact surface point of `base` near x, such as the closest point of a mesh: taken by the first layer
-  /// where the gradient of `base` vanishes before its surface is found. Empty: the best point found.
+  /// where the gradient of `base` vanishes before its surface is found. Empty: the best point found. Given up
+  /// once the first layer was sampled.
   std::optional<VectorField> closestPoint{};
   /// Margin of the band of a layer, by its index. Empty: 4 h. A bake at a coarser voxel size needs more.
   std::function<float(std::size_t layer)> margin{};
@@ -69,8 +70,7 @@ struct CumuloOptions {
 /// a distance. Cost per value: procedural see CumuloOptions::bake; sampled, one look-up per layer.
 /// @throws Error if voxelSize is not > 0, newtonSteps is outside 1 .. 64, or a layer has a billowScale or
 /// frequency that is not > 0 or an amplitude or noise without finite range.
-ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
-                   const CumuloOptions& options);
+ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers, CumuloOptions options);
 
 namespace detail {
 

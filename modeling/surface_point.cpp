@@ -64,11 +64,12 @@ void useFallback(const FieldNode<float>& l, const FieldNode<Vec3f>& fallback, co
 namespace detail {
 
 void projectToSurface(const FieldNode<float>& l, const PointBlock& points, const BlockLanes<3>& y,
-                      float* residual, const SurfacePointOptions& options, Scratch& scratch) {
+                      float* residual, const SurfacePointOptions& options, Scratch& scratch,
+                      const KnownStart* start) {
   Frame frame(scratch);
   const float tolerance = options.toleranceVoxels * options.voxel.value_or(differenceStepOf(l));
-  const BlockLanes<3> x = frame.lanes<3>(), g = frame.lanes<3>();
-  float* const f = frame.lane();
+  const BlockLanes<3> x = frame.lanes<3>(), slopes = frame.lanes<3>();
+  float* const level = frame.lane();
 
   std::array<int, kBlockSize> active;
   std::array<int, kBlockSize> flat;
@@ -78,10 +79,13 @@ void projectToSurface(const FieldNode<float>& l, const PointBlock& points, const
   PointBlock block = points;
   for (int step = 0; activeCount > 0; ++step) {
     const bool last = step == options.steps;
-    if (last)
-      l.eval(block, {f}, scratch);
-    else
-      l.evalGrad(block, {f}, g, scratch);
+    const bool known = step == 0 && start;
+    const float* f = known ? start->values : level;
+    const BlockLanes<3>& g = known ? start->grads : slopes;
+    if (last && !known)
+      l.eval(block, {level}, scratch);
+    else if (!known)
+      l.evalGrad(block, {level}, slopes, scratch);
 
     int next = 0;
     for (int i = 0; i < activeCount; ++i) {

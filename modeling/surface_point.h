@@ -31,10 +31,17 @@ VectorField surfacePoint(const ScalarField& l, const SurfacePointOptions& option
 
 namespace detail {
 
+/// l and its gradient at the points that a projection starts from, where they are known.
+struct KnownStart {
+  const float* values;
+  BlockLanes<3> grads;
+};
+
 /// The block form of `surfacePoint`: writes the points to `y` and l there, signed, to `residual`. All four
-/// lanes are results and must not overlap the points.
+/// lanes are results and must not overlap the points or `start`.
 void projectToSurface(const FieldNode<float>& l, const PointBlock& points, const BlockLanes<3>& y,
-                      float* residual, const SurfacePointOptions& options, Scratch& scratch);
+                      float* residual, const SurfacePointOptions& options, Scratch& scratch,
+                      const KnownStart* start = nullptr);
 
 }  // namespace detail
 }  // namespace nephele

@@ -49,8 +49,8 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
     LightVolume& light = suns.emplace_back(shading, sun.direction, progress);
     shadowDeeply(volume, sun, light, progress);
     if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
-    scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()},
-                          {sun.shadow.x, sun.shadow.y, sun.shadow.z}});
+    scene.suns.push_back(
+        {{nullptr, light.table().data(), light.brickCount()}, {sun.shadow.x, sun.shadow.y, sun.shadow.z}});
     toSun.emplace_back(light.worldToLattice(), light.firstBrick());
     directions.push_back(normalize(Vec3d(sun.direction)));
   }
@@ -63,6 +63,18 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   }
   scatter(volume, before, progress);
   for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
+  code();
+}
+
+// Last, when the floats have been read and what the light needed while it was made is given back.
+void BakedLight::code() {
+  scene.density.pairs = source->coded().pairs();
+  scene.density.entries = source->coded().entries();
+  for (std::size_t i = 0; i != suns.size(); ++i) {
+    suns[i].code();
+    scene.suns[i].pairs = suns[i].coded().pairs();
+    scene.suns[i].entries = suns[i].coded().entries();
+  }
 }
 
 // The column of an optical depth of 1 in the colour that a light's shadow is least opaque in; a light whose

@@ -67,6 +67,7 @@ struct BakedLight {
                     const Progress& progress) const;
   void takeLights();
   void addLocal(const LocalLight& light, const ProjectedLightVolume& shadows);
+  void code();
   void setColours(const RenderVolume& volume, float most);
   void scatter(const RenderVolume& volume, const BakedLight* before, const Progress& progress);
   void scatterGlow(const RenderVolume& volume, float g, const Progress& progress);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "modeling/error.h"
 
@@ -84,6 +85,32 @@ void Film::set(std::size_t at, const PixelSum& pixel) {
   if (light_ >= 0)
     for (std::size_t i = 0; i != lightCount_; ++i) setColour(light_ + int(i) * 3, at, pixel.light[i]);
   if (depth_ >= 0) value(depth_, at) = pixel.depth;
+}
+
+void Film::setMeans(int first, int count, std::size_t at, const std::array<std::size_t, 4>& from) {
+  for (int channel = first; channel != first + count; ++channel)
+    value(channel, at) = 0.25f * (value(channel, from[0]) + value(channel, from[1]) +
+                                  value(channel, from[2]) + value(channel, from[3]));
+}
+
+bool Film::interpolate(std::size_t at, const std::array<std::size_t, 4>& from, float threshold, float faint) {
+  for (int channel = 0; channel != 4; ++channel) {
+    const auto [least, most] = std::minmax(
+        {value(channel, from[0]), value(channel, from[1]), value(channel, from[2]), value(channel, from[3])});
+    if (!(most - least <= threshold * (channel == 3 ? 1.0f : std::max(most, faint)))) return false;
+  }
+  if (depth_ >= 0) {
+    const auto [near, far] = std::minmax(
+        {value(depth_, from[0]), value(depth_, from[1]), value(depth_, from[2]), value(depth_, from[3])});
+    // Infinite where a ray meets nothing.
+    if (std::isinf(near) != std::isinf(far)) return false;
+    value(depth_, at) = near;
+  }
+  setMeans(0, 4, at, from);
+  for (const int layer : {transmittance_, albedo_, emission_})
+    if (layer >= 0) setMeans(layer, 3, at, from);
+  if (light_ >= 0) setMeans(light_, 3 * int(lightCount_), at, from);
+  return true;
 }
 
 void Film::set(std::size_t at, const PixelPoint& point) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <limits>
 #include <string>
 #include <vector>
@@ -50,6 +51,10 @@ class Film {
 
   void set(std::size_t at, const PixelSum& pixel);
   void set(std::size_t at, const PixelPoint& point);
+  /// Fills what PixelSum fills with the means of four pixels, Z with the nearest, where these agree: R, G and
+  /// B within `threshold` of the brightest or of `faint`, A within `threshold`. Else does nothing and returns
+  /// false.
+  bool interpolate(std::size_t at, const std::array<std::size_t, 4>& from, float threshold, float faint);
   /// Any layer needs PixelPoint.
   bool wantsPoints() const { return medianDepth_ >= 0 || meanDepth_ >= 0 || wantsPositions(); }
   bool wantsPositions() const { return normal_ >= 0 || position_ >= 0 || motion_ >= 0; }
@@ -65,6 +70,7 @@ class Film {
  private:
   int addLayer(const std::string& name, const std::vector<std::string>& parts);
   void setColour(int channel, std::size_t at, const Vec3f& colour);
+  void setMeans(int first, int count, std::size_t at, const std::array<std::size_t, 4>& from);
   float& value(int channel, std::size_t at) { return image_.channels[std::size_t(channel)].values[at]; }
 
   Image image_;

@@ -27,31 +27,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "levelset/large_buffer.h"
 #include "modeling/error.h"
 #include "modeling/parallel.h"
+#include "render/light_slices.h"
 #include "render/sub_samples.h"
 
 namespace nephele {
 
 namespace {
 
-constexpr int kN = LightVolume::kWidth;  // nodes across a brick
-constexpr int kPatch = kN + 5;           // density samples around a brick's slice, half a slice up and down
-constexpr int kPitch = 16;               // floats per row of a patch
-constexpr int kRow = 12;                 // floats per row of nodes, a multiple of 4
-constexpr int kArea = kN * kRow;
+constexpr int kN = LightVolume::kWidth;    // nodes across a brick
+constexpr int kPatch = kN + 5;             // density samples around a brick's slice, half a slice up and down
+constexpr int kPitch = detail::kSliceRow;  // floats per row of a patch
+static_assert(kN == detail::kSliceNodes);
 
 }  // namespace
-
-/// Values at the nodes of a brick's slice.
-struct LightVolume::Nodes : std::array<float, kArea> {};
-
-/// Densities at a slice and the ones before and behind it on the light's way, and what lies between them.
-struct LightVolume::Slices {
-  alignas(64) Nodes previous{}, density{}, next{}, before{}, after{};
-};
 
 /// Density samples of a plane, the first of which stands at (u, v).
 struct LightVolume::Patch {
@@ -131,27 +124,17 @@ struct LightVolume::Sweep {
   }
 
   // Densities where the nodes from (u0, v0) on pass w, at most half a slice from the patch.
-  void interpolate(const Patch& patch, int u0, int v0, float atW, Nodes& out) const {
+  void interpolate(const Patch& patch, int u0, int v0, float atW, detail::SliceNodes& out) const {
     if (patch.empty) {
       out.fill(0.0f);
       return;
     }
     const float shiftU = slopeU * atW, shiftV = slopeV * atW;
     const float floorU = std::floor(shiftU), floorV = std::floor(shiftV);
-    const std::array<float, 4> atU = weights(shiftU - floorU), atV = weights(shiftV - floorV);
+    const detail::SliceWeights mix{weights(shiftU - floorU), weights(shiftV - floorV)};
     const float* first =
         patch.samples.data() + (v0 + int(floorV) - 1 - patch.v) * kPitch + (u0 + int(floorU) - 1 - patch.u);
-    alignas(64) float rows[(kN + 3) * kRow];
-    for (int j = 0; j != kN + 3; ++j) {
-      const float* a = first + j * kPitch;
-      float* row = rows + j * kRow;
-      // The whole row, so that it is a round number of vectors; the patch has room behind its last one.
-      for (int i = 0; i != kRow; ++i)
-        row[i] = (atU[0] * a[i] + atU[1] * a[i + 1]) + (atU[2] * a[i + 2] + atU[3] * a[i + 3]);
-    }
-    for (int i = 0; i != kArea; ++i)
-      out[std::size_t(i)] = (atV[0] * rows[i] + atV[1] * rows[i + kRow]) +
-                            (atV[2] * rows[i + 2 * kRow] + atV[3] * rows[i + 3 * kRow]);
+    detail::mixSlice(first, mix, out);
   }
 };
 
@@ -222,9 +205,10 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
   const auto poolAt = [&](int n) {
     return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
   };
-  alignas(64) Nodes sum{}, halfHere{}, halfNext{};
-  Slices at;
-  Patch here, next;
+  detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
+  detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
+  Patch patches[2];
+  Patch *here = &patches[0], *next = &patches[1];
   for (int n = 0; n != brickCount_.z;) {
     if (!poolAt(n)) {
       ++n;
@@ -235,30 +219,27 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
     // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
     const int slices = (end - n) * kBrick;
     int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
-    at.before.fill(0.0f);
-    at.previous.fill(0.0f);
-    sweep.load(u0, v0, k, here);
-    sweep.interpolate(here, u0, v0, float(k), at.density);
+    at.before->fill(0.0f);
+    at.previous->fill(0.0f);
+    sweep.load(u0, v0, k, *here);
+    sweep.interpolate(*here, u0, v0, float(k), *at.density);
     for (int slice = 0; slice <= slices; ++slice, k += down) {
       // What the way to the next slice adds.
-      at.after.fill(0.0f);
-      at.next.fill(0.0f);
-      if (slice < slices) {
-        sweep.load(u0, v0, k + down, next);
-        if (!here.empty || !next.empty) {
-          const float middle = float(k) + 0.5f * float(down);
-          const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
-          sweep.interpolate(here, u0, v0, middle, halfHere);
-          sweep.interpolate(next, u0, v0, middle, halfNext);
-          sweep.interpolate(next, u0, v0, float(k + down), at.next);
-          for (std::size_t m = 0; m != kArea; ++m)
-            at.after[m] = end1 * (at.density[m] + at.next[m]) + middle1 * (halfHere[m] + halfNext[m]);
-        }
+      if (slice < slices && (sweep.load(u0, v0, k + down, *next) || !here->empty)) {
+        const float middle = float(k) + 0.5f * float(down);
+        const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
+        sweep.interpolate(*here, u0, v0, middle, halfHere);
+        sweep.interpolate(*next, u0, v0, middle, halfNext);
+        sweep.interpolate(*next, u0, v0, float(k + down), *at.next);
+        detail::addSlices(end1, *at.density, *at.next, middle1, halfHere, halfNext, *at.after);
+      } else {
+        at.after->fill(0.0f);
+        at.next->fill(0.0f);
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
       if (slice < slices) store(sweep, poolAt(brick), inside, sum, at);
       if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, at);
-      for (std::size_t m = 0; m != kArea; ++m) sum[m] += at.after[m];
+      detail::addSlice(*at.after, sum);
       std::swap(at.before, at.after);
       std::swap(at.previous, at.density);
       std::swap(at.density, at.next);
@@ -270,18 +251,11 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
 
 // Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of
 // interpolation along the light.
-void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum,
-                        const Slices& at) {
+void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
+                        const detail::Slices& at) {
   const int slice = sweep.fromAbove ? kBrick - inside : inside;
   float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
-  const float share = sweep.step * (4.0f / 3) / 12;
-  for (int j = 0; j != kWidth; ++j)
-    for (int i = 0; i != kWidth; ++i) {
-      const std::size_t m = std::size_t(j * kRow + i);
-      const float before = std::max(at.before[m], 0.0f), after = std::max(at.after[m], 0.0f);
-      const float growth = before * (at.density[m] - at.previous[m]) + after * (at.next[m] - at.density[m]);
-      out[j * kWidth + i] = sum[m] - share * growth / std::max(before + after, 1e-30f);
-    }
+  detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, out);
 }
 
 void detail::ColumnShade::addTo(float* values, int slice, float perDepth) const {
@@ -369,6 +343,10 @@ void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
   });
 }
 
+void LightVolume::code() {
+  if (coded_.isEmpty()) coded_ = CodedBricks(std::exchange(values_, {}), table_);
+}
+
 float LightVolume::columnDensity(const Vec3f& world) const {
   if (table_.empty()) return 0.0f;
   const Vec3f p = worldToLattice_(world);
@@ -377,16 +355,19 @@ float LightVolume::columnDensity(const Vec3f& world) const {
   const Vec3i b = brick - firstBrick_;
   for (int axis = 0; axis != 3; ++axis)
     if (b[axis] < 0 || b[axis] >= brickCount_[axis]) return 0.0f;
-  const std::size_t pool = std::size_t(
-      table_[(std::size_t(b.z) * brickCount_.y + std::size_t(b.y)) * brickCount_.x + std::size_t(b.x)]);
+  const std::size_t place =
+      (std::size_t(b.z) * brickCount_.y + std::size_t(b.y)) * brickCount_.x + std::size_t(b.x);
+  const auto node = [&](const Vec3i& n) {
+    if (!coded_.isEmpty()) return coded_.at(place, n);
+    return values_[std::size_t(table_[place]) * kVolume + std::size_t((n.z * kWidth + n.y) * kWidth + n.x)];
+  };
   const Vec3i at = cell - brick * kBrick;
   const Vec3f f = p - Vec3f(cell);
   float sum = 0;
   for (int corner = 0; corner != 8; ++corner) {
     const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
     const float weight = (dx ? f.x : 1 - f.x) * (dy ? f.y : 1 - f.y) * (dz ? f.z : 1 - f.z);
-    sum += weight *
-           values_[pool * kVolume + std::size_t(((at.z + dz) * kWidth + at.y + dy) * kWidth + at.x + dx)];
+    sum += weight * node(at + Vec3i{dx, dy, dz});
   }
   return sum;
 }
@@ -399,7 +380,7 @@ double LightVolume::estimateBytes(const RenderVolume& volume) {
   for (int w = 0; w != 3; ++w)
     box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
   const double bricks = std::min(9.0 * double(volume.occupiedBricks().size()), box);
-  return bricks * kVolume * sizeof(float) + box * sizeof(std::int32_t);
+  return bricks * kVolume * sizeof(float) + box * (sizeof(std::int32_t) + sizeof(CodedBricks::Entry));
 }
 
 }  // namespace nephele

@@ -8,9 +8,15 @@
 
 #include "modeling/progress.h"
 #include "render/camera.h"
+#include "render/coded_bricks.h"
 #include "render/render_volume.h"
 
 namespace nephele {
+
+namespace detail {
+struct SliceNodes;
+struct Slices;
+}  // namespace detail
 
 /// How much density lies between every point of a volume and a distant light, on a lattice whose third axis
 /// runs along the light.
@@ -40,8 +46,15 @@ class LightVolume {
   Vec3i brickCount() const { return brickCount_; }
   /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros.
   const std::vector<std::int32_t>& table() const { return table_; }
-  /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells.
+  /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells. Empty once coded.
   const std::vector<float>& values() const { return values_; }
+
+  /// Codes the values for the march, in their own memory: the last thing to do, since neither `replace` nor
+  /// `addShade` may follow. Uses all cores.
+  /// @throws Error if there are more than 5.8 million bricks.
+  void code();
+  /// Empty until `code`.
+  const CodedBricks& coded() const { return coded_; }
 
   /// Adds the shadow of opaque things within `box` to c: where a ray from the light, which starts outside of
   /// the box and travels against `towards`, has met one after distanceToShade(ray), infinite if it meets
@@ -53,7 +66,7 @@ class LightVolume {
   /// c at a world-space point. Slow; for tests.
   float columnDensity(const Vec3f& world) const;
   std::size_t memoryBytes() const {
-    return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t);
+    return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t) + coded_.memoryBytes();
   }
 
   /// Upper bound of the bytes that a light volume of `volume` takes, whatever the direction.
@@ -61,18 +74,18 @@ class LightVolume {
 
  private:
   struct Sweep;
-  struct Nodes;
-  struct Slices;
   struct Patch;
 
   void findBricks(const RenderVolume& volume, const Sweep& sweep);
   void fillColumn(const Sweep& sweep, std::size_t column);
-  void store(const Sweep& sweep, std::int32_t pool, int inside, const Nodes& sum, const Slices& at);
+  void store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
+             const detail::Slices& at);
 
   Affine worldToLattice_;
   Vec3i firstBrick_, brickCount_;
   std::vector<std::int32_t> table_;
   std::vector<float> values_;
+  CodedBricks coded_;
 };
 
 namespace detail {

@@ -99,8 +99,7 @@ struct Lights {
   /// the marcher, as DistantLight::deepShadow.
   std::optional<float> deepTolerance{};
   /// Nodes per voxel, along each axis, of the lattices that shadows of suns, points and spots are kept on: 1,
-  /// 2 or
-  /// 4. Where a voxel is opaque, a shadow changes within it. Time and memory of them grow with the cube.
+  /// 2 or 4. Where a voxel is opaque, a shadow changes within it. Time and memory of them grow with the cube.
   int shadowDetail = 1;
 
   /// Most suns, and most points and spots.

@@ -5,7 +5,9 @@
 // exactly, whatever the steps are.
 //
 // Steps are gathered into blocks of 32 that run across bricks. A block is looked up as vectors: brick table,
-// then the eight corners, in the density, in every sun's column densities and in the scattered light.
+// then the eight corners, in the density, in every sun's column densities and in the scattered light. The
+// first two are CodedBricks: what limits a sample is how many loads and shuffles it takes, and they need half
+// as many. Whatever does not have to wait for the densities stands beside what does.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE
@@ -17,8 +19,8 @@
 
 #include "hwy/contrib/math/math-inl.h"
 #include "levelset/brick_grid.h"
-#include "render/brick_walk.h"
 #include "render/light_volume.h"
+#include "render/march_runs.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
@@ -157,27 +159,25 @@ struct Places {
   Point share;
 };
 
+constexpr float kJustBelow1 = 1.0f - 0x1p-24f;
+
 template <int kWidth>
 HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places) {
   const Lanes d;
   const IntLanes i;
-  const Floats zero = hn::Zero(d), size = hn::Set(d, 8.0f), eighth = hn::Set(d, 0.125f);
-  // Just under 8, so that a point on the far face still lies in the last cell.
-  const Floats last = hn::Set(d, 7.9999995f);
-  const auto brickOf = [&](Floats x, int count) HWY_ATTR {
-    return hn::Min(hn::Max(hn::Floor(hn::Mul(x, eighth)), zero), hn::Set(d, float(count - 1)));
+  const auto within = [&](Floats x, int count) HWY_ATTR {
+    // Just under the end, so that a point on the far face still lies in the last cell.
+    return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, 8.0f * float(count) * kJustBelow1));
   };
-  const auto within = [&](Floats x, Floats brick)
-                          HWY_ATTR { return hn::Min(hn::Max(hn::NegMulAdd(brick, size, x), zero), last); };
-  const Point brick{brickOf(p.x, bricks.count.x), brickOf(p.y, bricks.count.y), brickOf(p.z, bricks.count.z)};
-  const Point local{within(p.x, brick.x), within(p.y, brick.y), within(p.z, brick.z)};
-  const Point cell{hn::Floor(local.x), hn::Floor(local.y), hn::Floor(local.z)};
-  const Ints row = hn::Add(hn::Mul(wholeOf(brick.z), hn::Set(i, bricks.count.y)), wholeOf(brick.y));
-  hn::Store(hn::Add(hn::Mul(row, hn::Set(i, bricks.count.x)), wholeOf(brick.x)), i, places.entry);
-  hn::Store(wholeOf(hn::MulAdd(cell.z, hn::Set(d, float(kWidth * kWidth)),
-                               hn::MulAdd(cell.y, hn::Set(d, float(kWidth)), cell.x))),
-            i, places.node);
-  places.share = {hn::Sub(local.x, cell.x), hn::Sub(local.y, cell.y), hn::Sub(local.z, cell.z)};
+  const Point q{within(p.x, bricks.count.x), within(p.y, bricks.count.y), within(p.z, bricks.count.z)};
+  const Point cell{hn::Floor(q.x), hn::Floor(q.y), hn::Floor(q.z)};
+  const Ints x = wholeOf(cell.x), y = wholeOf(cell.y), z = wholeOf(cell.z);
+  const Ints row = hn::Add(hn::Mul(hn::ShiftRight<3>(z), hn::Set(i, bricks.count.y)), hn::ShiftRight<3>(y));
+  hn::Store(hn::Add(hn::Mul(row, hn::Set(i, bricks.count.x)), hn::ShiftRight<3>(x)), i, places.entry);
+  const Ints inside = hn::Set(i, 7), width = hn::Set(i, kWidth);
+  const Ints line = hn::Add(hn::Mul(hn::And(z, inside), width), hn::And(y, inside));
+  hn::Store(hn::Add(hn::Mul(line, width), hn::And(x, inside)), i, places.node);
+  places.share = {hn::Sub(q.x, cell.x), hn::Sub(q.y, cell.y), hn::Sub(q.z, cell.z)};
 }
 
 template <int kWidth, int kBefore>
@@ -196,6 +196,69 @@ HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
   Places places;
   locate<kWidth>(bricks, p, places);
   return read<kWidth, kBefore>(bricks, places);
+}
+
+// Of vectors that hold pairs side by side, all the first halves or all the second.
+HWY_INLINE Floats firstOf(Floats low, Floats high) {
+#if HWY_TARGET == HWY_SCALAR
+  return static_cast<void>(high), low;
+#else
+  return hn::ConcatEven(Lanes(), high, low);
+#endif
+}
+
+HWY_INLINE Floats secondOf(Floats low, Floats high) {
+#if HWY_TARGET == HWY_SCALAR
+  return static_cast<void>(low), high;
+#else
+  return hn::ConcatOdd(Lanes(), high, low);
+#endif
+}
+
+// At places in coded bricks; nothing is below 0.
+HWY_INLINE Floats readCoded(const MarchScene::Bricks& bricks, const Places& places) {
+  const Lanes d;
+  // As in Corners, the two rows of a cell; and what belongs to the brick.
+  Floats rows[2][2], entries[2];
+#if HWY_TARGET == HWY_SCALAR
+  const CodedBricks::Entry& entry = bricks.entries[places.entry[0]];
+  const float* at = bricks.pairs + (entry.first + std::uint32_t(places.node[0]));
+  for (int part = 0; part != 2; ++part) {
+    rows[0][part] = hn::Set(d, at[part]);
+    rows[1][part] = hn::Set(d, at[CodedBricks::kWidth + part]);
+    entries[part] = hn::Set(d, entry.unit);
+  }
+#else
+  static_assert(sizeof(CodedBricks::Entry) == 2 * sizeof(float));
+  for (int part = 0; part != 2; ++part) {
+    const float *at[kLanes / 2], *own[kLanes / 2];
+    for (int n = 0; n != kLanes / 2; ++n) {
+      const int lane = part * (kLanes / 2) + n;
+      const CodedBricks::Entry* entry = bricks.entries + inMemory(places.entry)[lane];
+      own[n] = reinterpret_cast<const float*>(entry);
+      at[n] = bricks.pairs + (entry->first + std::uint32_t(inMemory(places.node)[lane]));
+    }
+    entries[part] = pairsAt(d, own, 0);
+    rows[0][part] = pairsAt(d, at, 0);
+    rows[1][part] = pairsAt(d, at, CodedBricks::kWidth);
+  }
+#endif
+  const auto alongZ = [&](Floats pairs) HWY_ATTR {
+    const IntLanes i;
+    const hn::RebindToUnsigned<Lanes> u;
+    const auto bits = hn::BitCast(u, pairs);
+    const Floats near = hn::ConvertTo(d, hn::BitCast(i, hn::And(bits, hn::Set(u, 0xffffu)))),
+                 far = hn::ConvertTo(d, hn::BitCast(i, hn::ShiftRight<16>(bits)));
+    return hn::MulAdd(places.share.z, hn::Sub(far, near), near);
+  };
+  const auto alongRow = [&](const Floats(&row)[2]) HWY_ATTR {
+    const Floats first = alongZ(firstOf(row[0], row[1])), second = alongZ(secondOf(row[0], row[1]));
+    return hn::MulAdd(places.share.x, hn::Sub(second, first), first);
+  };
+  const Floats low = alongRow(rows[0]), high = alongRow(rows[1]);
+  const Floats code = hn::MulAdd(places.share.y, hn::Sub(high, low), low);
+  const Floats above = hn::Max(hn::Sub(code, hn::Set(d, CodedBricks::kZero)), hn::Zero(d));
+  return hn::Mul(above, secondOf(entries[0], entries[1]));
 }
 
 // Lane n of the result is lane `from[n]` of x.
@@ -248,17 +311,48 @@ HWY_INLINE Floats movedUp(Floats x, Floats first) {
   return hn::IfThenElse(hn::FirstN(d, 1), first, reordered(x, order));
 }
 
-// As many samples as a block has, at distances s along a ray. All places are found before the first value is
-// read, so that the processor need not wait for one vector before it starts the next.
-template <int kSize, int kWidth, int kBefore>
+// Places in coded bricks of as many samples as a block has, at distances s along a ray. All are found before
+// the first value is read, so that the processor need not wait for one vector before it starts the next.
+template <int kSize>
+HWY_INLINE void locateBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
+                            const float* HWY_RESTRICT s, Places (&places)[kSize / kLanes]) {
+  for (int v = 0; v != kSize / kLanes; ++v)
+    locate<CodedBricks::kWidth>(bricks, pointAt(ray, hn::Load(Lanes(), s + v * kLanes)), places[v]);
+}
+
+template <int kSize>
+HWY_INLINE void readBlock(const MarchScene::Bricks& bricks, const Places (&places)[kSize / kLanes],
+                          float* HWY_RESTRICT values) {
+  for (int v = 0; v != kSize / kLanes; ++v)
+    hn::Store(readCoded(bricks, places[v]), Lanes(), values + v * kLanes);
+}
+
+template <int kSize>
 HWY_INLINE void sampleBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
                             const float* HWY_RESTRICT s, float* HWY_RESTRICT values) {
-  const Lanes d;
   Places places[kSize / kLanes];
-  for (int v = 0; v != kSize / kLanes; ++v)
-    locate<kWidth>(bricks, pointAt(ray, hn::Load(d, s + v * kLanes)), places[v]);
-  for (int v = 0; v != kSize / kLanes; ++v)
-    hn::Store(hn::Max(read<kWidth, kBefore>(bricks, places[v]), hn::Zero(d)), d, values + v * kLanes);
+  locateBlock<kSize>(bricks, ray, s, places);
+  readBlock<kSize>(bricks, places, values);
+}
+
+// 2^f = 1 + kPower[0] f + ... for |f| <= 1/2: best fit, off by 2e-8 of it at most.
+constexpr float kPower[] = {0.693147182f,   0.240226477f,   0.0555033237f,
+                            0.00961843692f, 0.00133988739f, 0.00015353362f};
+
+// exp(-x) for x from 0 to 80, off by 1e-7 (1 + x) of it at most; 1 where x is 0. Half the work of what
+// libraries have for all numbers.
+HWY_INLINE Floats expOfMinus(Floats x) {
+  const Lanes d;
+  const IntLanes i;
+  // The last bits of `whole` are the nearest whole number.
+  const Floats y = hn::Mul(x, hn::Set(d, -1.44269504f)), middle = hn::Set(d, 12582912.0f);
+  const Floats whole = hn::Add(y, middle), f = hn::Sub(y, hn::Sub(whole, middle)), f2 = hn::Mul(f, f);
+  const auto line = [&](float slope, float at0)
+                        HWY_ATTR { return hn::MulAdd(f, hn::Set(d, slope), hn::Set(d, at0)); };
+  const Floats high = hn::MulAdd(hn::MulAdd(f2, hn::Set(d, kPower[5]), line(kPower[4], kPower[3])), f2,
+                                 line(kPower[2], kPower[1]));
+  const Floats power = hn::MulAdd(high, f2, line(kPower[0], 1.0f));
+  return hn::BitCast(d, hn::Add(hn::BitCast(i, power), hn::ShiftLeft<23>(hn::BitCast(i, whole))));
 }
 
 // Three values at once, at p within bricks that are laid out as the density's.
@@ -357,19 +451,30 @@ class Marcher {
     someKnown_ = false;
     result_.samples += std::uint32_t(used);
 
-    alignas(64) float depth[kBlock];
+    // The first sun's light is read here, beside the densities, which have to be waited for.
+    alignas(64) float depth[kSize], column[kSize];
+    const bool hasSun = !scene_.suns.empty();
+    Places places[kSize / kLanes], sunPlaces[kSize / kLanes];
+    if (!someKnown) locateBlock<kSize>(scene_.density, ray_.density, s_, places);
+    if (hasSun) locateBlock<kSize>(scene_.suns[0], ray_.suns[0], s_, sunPlaces);
     if (!someKnown) {
-      sampleBlock<kSize, BrickGrid::kWidth, BrickGrid::kBefore>(scene_.density, ray_.density, s_, depth);
+      readBlock<kSize>(scene_.density, places, depth);
     } else {
       for (std::size_t i = 0; i < kSize; i += lanes) {
         Floats density = hn::Load(d, known_ + i);
-        if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d))))
-          density = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
-                                scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i))),
-                            hn::Zero(d));
+        if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d)))) {
+          locate<CodedBricks::kWidth>(scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i)), places[0]);
+          density = readCoded(scene_.density, places[0]);
+        }
         hn::Store(density, d, depth + i);
       }
     }
+    if (!scene_.emission.table) {
+      Floats most = hn::Zero(d);
+      for (std::size_t i = 0; i < kSize; i += lanes) most = hn::Max(most, hn::Load(d, depth + i));
+      if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
+    }
+    if (hasSun) readBlock<kSize>(scene_.suns[0], sunPlaces, column);
     const Floats extinction = hn::Set(d, scene_.extinction);
     for (std::size_t i = 0; i < kSize; i += lanes)
       hn::Store(hn::Mul(hn::Mul(hn::Load(d, depth + i), extinction), hn::Load(d, ds_ + i)), d, depth + i);
@@ -382,7 +487,6 @@ class Marcher {
       hn::Store(sums, d, after + i);
     }
     depth_ = hn::GetLane(behind);
-    if (depth_ == start && !scene_.emission.table) return true;
     if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
       while (after[first] <= detail::kVisibleDepth) ++first;
@@ -391,20 +495,20 @@ class Marcher {
 
     if (isHeld_) hold(start, after, used);
     if (record_) record(start, after, used);
-    if (scene_.isColoured()) return flushColours<kSize>(depth, after);
+    if (scene_.isColoured()) return flushColours<kSize>(depth, after, column);
 
     Weights<1> weights;
     Floats through = hn::Set(d, through_);
     for (std::size_t i = 0; i < kSize; i += lanes) {
       const Floats tau = hn::Min(hn::Load(d, after + i), hn::Set(d, 80.0f));
-      const Floats left = hn::Exp(d, hn::Neg(tau));
+      const Floats left = expOfMinus(tau);
       Floats weight = hn::Sub(movedUp(left, through), left);
       if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
       hn::Store(weight, d, weights.of[0] + i);
       through = broadcastLast(left);
     }
     through_ = hn::GetLane(through);
-    light<kSize>(weights);
+    light<kSize>(weights, column);
     return through_ > scene_.cutoff;
   }
 
@@ -448,16 +552,16 @@ class Marcher {
   // The same where colours differ in more than their albedo: `after` are optical depths behind the steps,
   // `depth` their own.
   template <int kSize>
-  bool flushColours(const float* depth, const float* after) {
+  bool flushColours(const float* depth, const float* after, const float* column) {
     const Lanes d;
     const std::size_t lanes = hn::Lanes(d);
     alignas(64) float through[3][kBlock + 1];
     for (int c = 0; c != 3; ++c) {
       through[c][0] = throughColours_[c];
-      const Floats share = hn::Set(d, -scene_.extinctionColour[c]);
+      const Floats share = hn::Set(d, scene_.extinctionColour[c]);
       for (std::size_t i = 0; i < kSize; i += lanes) {
-        const Floats tau = hn::Max(hn::Mul(hn::Load(d, after + i), share), hn::Set(d, -80.0f));
-        hn::StoreU(hn::Exp(d, tau), d, through[c] + 1 + i);
+        const Floats tau = hn::Min(hn::Mul(hn::Load(d, after + i), share), hn::Set(d, 80.0f));
+        hn::StoreU(expOfMinus(tau), d, through[c] + 1 + i);
       }
       throughColours_[c] = through[c][kSize];
     }
@@ -496,17 +600,18 @@ class Marcher {
       }
       for (int c = 0; c != 3; ++c) hn::Store(hn::Mul(weight[c], seen), d, weights.of[c] + i);
     }
-    light<kSize>(weights);
+    light<kSize>(weights, column);
     return std::max({throughColours_[0], throughColours_[1], throughColours_[2]}) > scene_.cutoff;
   }
 
   // Adds the light that steps of one weight, or of one for each colour, send to the eye.
   template <int kSize, int kColours>
-  void light(const Weights<kColours>& weights) {
+  void light(const Weights<kColours>& weights, const float* firstColumn) {
     const Lanes d;
     for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-      alignas(64) float column[kSize];
-      sampleBlock<kSize, LightVolume::kWidth, 0>(scene_.suns[sun], ray_.suns[sun], s_, column);
+      alignas(64) float other[kSize];
+      if (sun > 0) sampleBlock<kSize>(scene_.suns[sun], ray_.suns[sun], s_, other);
+      const float* column = sun > 0 ? other : firstColumn;
       for (int n = 0; n != scene_.octaves; ++n)
         for (int c = 0; c != kColours; ++c) {
           const float share = scene_.extinction * scene_.attenuation[n] *
@@ -516,7 +621,7 @@ class Marcher {
           for (int i = 0; i != kSize; i += kLanes) {
             const Floats left =
                 hn::Min(hn::Mul(hn::Load(d, column + i), hn::Set(d, share)), hn::Set(d, 80.0f));
-            sum = hn::MulAdd(hn::Exp(d, hn::Neg(left)), hn::Load(d, weights.of[c] + i), sum);
+            sum = hn::MulAdd(expOfMinus(left), hn::Load(d, weights.of[c] + i), sum);
           }
           const float all = hn::GetLane(hn::SumOfLanes(d, sum));
           if constexpr (kColours == 1)
@@ -600,7 +705,7 @@ class Marcher {
       const Floats lit = hn::Mul(hn::MulAdd(part, hn::Sub(p1, p0), p0), share);
       const auto seen = [&](float extinction, Floats of) HWY_ATTR {
         const Floats left = hn::Min(hn::Mul(depth, hn::Set(d, extinction)), hn::Set(d, 80.0f));
-        return hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(hn::Exp(d, hn::Neg(left)), lit), of)));
+        return hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(expOfMinus(left), lit), of)));
       };
       if constexpr (kColours == 1) {
         const float sum = seen(scene_.attenuation[n] * light.shadow[0], weight[0]);

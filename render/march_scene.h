@@ -7,6 +7,7 @@
 
 #include "modeling/interval.h"
 #include "modeling/math.h"
+#include "render/coded_bricks.h"
 
 namespace nephele {
 
@@ -23,6 +24,9 @@ struct MarchScene {
     const float* values = nullptr;
     const std::int32_t* table = nullptr;
     Vec3i count{};
+    /// See CodedBricks. Of the density and the suns marchRays reads these, and marchRaysScalar the values.
+    const float* pairs = nullptr;
+    const CodedBricks::Entry* entries = nullptr;
   };
 
   Bricks density;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -12,6 +13,7 @@
 
 #include "modeling/error.h"
 #include "modeling/parallel.h"
+#include "render/environment.h"
 #include "render/film.h"
 #include "render/light_volume.h"
 #include "render/picture.h"
@@ -23,6 +25,10 @@ namespace nephele {
 namespace {
 
 constexpr int kTile = 16;
+// Where only some pixels are marched: wide enough that few of them are at a border.
+constexpr int kAdaptiveTile = 32;
+// How far apart the first of these are.
+constexpr int kApart = 4;
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -49,6 +55,10 @@ void check(const RenderOptions& options) {
           fmt::format("samples: expected 1 to 4096, got {}", options.samples));
   require(!options.step || (std::isfinite(*options.step) && *options.step > 0),
           fmt::format("step: expected a length > 0, got {}", options.step.value_or(0)));
+  require(options.adaptiveThreshold >= 0 && options.adaptiveThreshold <= 1,
+          fmt::format("adaptive threshold: expected 0 to 1, got {}", options.adaptiveThreshold));
+  require(!(options.adaptiveThreshold > 0 && options.deep),
+          "adaptive threshold: deep pictures need every pixel to be marched");
   require(std::isfinite(options.refinement.threshold) && options.refinement.threshold > 0,
           fmt::format("refinement: expected a threshold > 0, got {}", options.refinement.threshold));
   require(options.refinement.halvings >= 0 && options.refinement.halvings <= 16,
@@ -79,6 +89,99 @@ std::shared_ptr<const detail::BakedLight> bake(const RenderVolume& volume, const
                                                     surfaces);
 }
 
+// A fiftieth of what a thin white medium sends back of suns and sky: what is darker need not be told apart
+// as finely.
+float faintRadiance(const detail::BakedLight& lit) {
+  Vec3f sum = lit.sky ? lit.sky->mean() : lit.lights.sky;
+  for (const DistantLight& sun : lit.distant) sum += sun.irradiance / (4 * kPi);
+  return 0.02f * std::max({sum.x, sum.y, sum.z});
+}
+
+// Marches the pixels of tiles into a film.
+class TileMarcher {
+ public:
+  TileMarcher(const detail::Picture& picture, const PixelBox& window, const RenderOptions& options,
+              float faint, Film& film, DeepImage* deep)
+      : picture_(picture),
+        film_(film),
+        deep_(deep),
+        window_(window),
+        threshold_(options.adaptiveThreshold),
+        faint_(faint),
+        raysPerPixel_(options.samples),
+        scratch_(options) {}
+
+  // `tile` counts from the picture's first pixel.
+  void march(const PixelBox& tile) {
+    if (threshold_ > 0)
+      marchWhereNeeded(tile);
+    else
+      for (int y = tile.y0; y != tile.y1; ++y) marchRow(tile.x0, tile.x1, y);
+    if (!film_.wantsPoints()) return;
+    picture_.points({window_.x0 + tile.x0, window_.y0 + tile.y0, window_.x0 + tile.x1, window_.y0 + tile.y1},
+                    scratch_);
+    const PixelPoint* point = scratch_.points.data();
+    for (int y = tile.y0; y != tile.y1; ++y)
+      for (int x = tile.x0; x != tile.x1; ++x) film_.set(at(x, y), *point++);
+  }
+
+  std::uint64_t samples = 0, rays = 0;
+
+ private:
+  std::size_t at(int x, int y) const {
+    return std::size_t(y) * std::size_t(window_.width()) + std::size_t(x);
+  }
+
+  void marchRow(int x0, int x1, int y) {
+    const int together = picture_.pixelsTogether();
+    for (int x = x0; x < x1; x += together) {
+      const int count = std::min(together, x1 - x);
+      picture_.march(window_.x0 + x, window_.y0 + y, count, scratch_);
+      for (int i = 0; i != count; ++i) {
+        samples += picture_.gather(i, scratch_);
+        film_.set(at(x + i, y), scratch_.sum);
+        if (deep_) deep_->pixels[at(x + i, y)] = std::move(scratch_.samples);
+      }
+      rays += std::uint64_t(count) * std::uint64_t(raysPerPixel_);
+    }
+  }
+
+  // Pixels far apart first, then those in the middle of four, then those between, and so on half as far
+  // apart. Neighbours beyond the tile are not asked, so that tiles do not depend on each other.
+  void marchWhereNeeded(const PixelBox& tile) {
+    for (int y = tile.y0; y < tile.y1; y += kApart)
+      for (int x = tile.x0; x < tile.x1; x += kApart) marchRow(x, x + 1, y);
+    for (int apart = kApart; apart != 1; apart /= 2) {
+      const int half = apart / 2;
+      for (int y = tile.y0 + half; y < tile.y1; y += apart)
+        for (int x = tile.x0 + half; x < tile.x1; x += apart)
+          fill(tile, x, y, {{{-half, -half}, {half, -half}, {-half, half}, {half, half}}});
+      for (int y = tile.y0; y < tile.y1; y += half)
+        for (int x = tile.x0 + ((y - tile.y0) % apart == 0 ? half : 0); x < tile.x1; x += apart)
+          fill(tile, x, y, {{{-half, 0}, {half, 0}, {0, -half}, {0, half}}});
+    }
+  }
+
+  void fill(const PixelBox& tile, int x, int y, const std::array<std::array<int, 2>, 4>& around) {
+    std::array<std::size_t, 4> from;
+    for (std::size_t i = 0; i != 4; ++i) {
+      const int nextX = x + around[i][0], nextY = y + around[i][1];
+      if (nextX < tile.x0 || nextY < tile.y0 || nextX >= tile.x1 || nextY >= tile.y1)
+        return marchRow(x, x + 1, y);
+      from[i] = at(nextX, nextY);
+    }
+    if (!film_.interpolate(at(x, y), from, threshold_, faint_)) marchRow(x, x + 1, y);
+  }
+
+  const detail::Picture& picture_;
+  Film& film_;
+  DeepImage* deep_;
+  PixelBox window_;
+  float threshold_, faint_;
+  int raysPerPixel_;
+  detail::Picture::Scratch scratch_;
+};
+
 RenderResult look(const detail::BakedLight* lit, const Camera& camera, const RenderOptions& options,
                   Film& film, const Progress& progress) {
   RenderResult result;
@@ -100,37 +203,23 @@ RenderResult look(const detail::BakedLight* lit, const Camera& camera, const Ren
   const auto start = std::chrono::steady_clock::now();
   const detail::Picture picture(*lit, camera, options, film);
   progress.begin("march");
-  const int across = (width + kTile - 1) / kTile, down = (height + kTile - 1) / kTile;
-  std::atomic<std::uint64_t> samples{0};
+  const float faint = faintRadiance(*lit);
+  const int side = options.adaptiveThreshold > 0 ? kAdaptiveTile : kTile;
+  const int across = (width + side - 1) / side, down = (height + side - 1) / side;
+  std::atomic<std::uint64_t> samples{0}, rays{0};
   parallelFor(
       std::size_t(across) * down, 1,
       [&](std::size_t begin, std::size_t end) {
-        detail::Picture::Scratch scratch(options);
-        const int together = picture.pixelsTogether();
+        TileMarcher marcher(picture, window, options, faint, film, result.deep ? &*result.deep : nullptr);
         for (std::size_t tile = begin; tile != end; ++tile) {
-          const int x0 = int(tile % std::size_t(across)) * kTile,
-                    y0 = int(tile / std::size_t(across)) * kTile;
-          const int x1 = std::min(x0 + kTile, width), y1 = std::min(y0 + kTile, height);
-          std::uint64_t taken = 0;
-          for (int y = y0; y < y1; ++y)
-            for (int x = x0; x < x1; ++x) {
-              const std::size_t at = std::size_t(y) * width + x;
-              if ((x - x0) % together == 0)
-                picture.march(window.x0 + x, window.y0 + y, std::min(together, x1 - x), scratch);
-              taken += picture.gather((x - x0) % together, scratch);
-              film.set(at, scratch.sum);
-              if (result.deep) result.deep->pixels[at] = std::move(scratch.samples);
-            }
-          if (film.wantsPoints()) {
-            picture.points({window.x0 + x0, window.y0 + y0, window.x0 + x1, window.y0 + y1}, scratch);
-            const PixelPoint* point = scratch.points.data();
-            for (int y = y0; y < y1; ++y)
-              for (int x = x0; x < x1; ++x) film.set(std::size_t(y) * width + x, *point++);
-          }
-          samples += taken;
+          const int x0 = int(tile % std::size_t(across)) * side, y0 = int(tile / std::size_t(across)) * side;
+          marcher.march({x0, y0, std::min(x0 + side, width), std::min(y0 + side, height)});
         }
+        samples += marcher.samples;
+        rays += marcher.rays;
       },
       progress);
+  result.rays = rays;
   result.samples = samples;
   progress.count("rays", double(result.rays));
   progress.count("samples", double(result.samples));

@@ -43,6 +43,12 @@ struct RenderOptions {
   int samples = 4;
   /// Moves the pattern of the samples.
   std::uint64_t seed = 0;
+  /// 0: every pixel is marched. Otherwise every fourth of every fourth row is, and those between only where
+  /// their four neighbours differ by more than this: in R, G or B as a share of the brightest of them (or
+  /// of a fiftieth of what suns and sky make of a thin white medium), or in opacity. The others get the mean
+  /// of the four (adaptive subdivision of the picture, Whitted 1980). Details less than four pixels wide may
+  /// be missed. At most 1; not for deep pictures.
+  float adaptiveThreshold = 0.0f;
   /// When the volume is looked at, if it moves; the camera's own shutter is in Camera::withShutter.
   Shutter shutter{};
   /// Of the volume, while the shutter is open. The light in it moves along with it.

@@ -285,13 +285,18 @@ float RenderVolume::typicalDensity() const {
   return total.density > 0 ? float(total.squares / total.density) : 0.0f;
 }
 
+const CodedBricks& RenderVolume::coded() const {
+  std::call_once(coded_->once, [this] { coded_->bricks = CodedBricks(*density_); });
+  return coded_->bricks;
+}
+
 std::size_t RenderVolume::memoryBytes() const {
   std::size_t others = 0;
   for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
     for (const auto& grid : *grids) others += grid ? grid->memoryBytes() : 0;
   if (field_) others += field_->memoryBytes();
-  return density_->memoryBytes() + others + emptiness_.size() + uniformity_.size() +
-         occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
+  return density_->memoryBytes() + CodedBricks::estimateBytes(*density_) + others + emptiness_.size() +
+         uniformity_.size() + occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
 }
 
 }  // namespace nephele

@@ -3,11 +3,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
 #include "levelset/brick_grid.h"
 #include "modeling/box.h"
+#include "render/coded_bricks.h"
 
 namespace nephele {
 
@@ -43,6 +45,9 @@ class RenderVolume {
                               std::shared_ptr<const FieldDensity> field);
 
   const BrickGrid& density() const { return *density_; }
+  /// The density as the march reads it. Made at the first call, by one thread of those that ask. Cost: one
+  /// pass over the samples.
+  const CodedBricks& coded() const;
   /// Null where the grid is all there is.
   const FieldDensity* field() const { return field_.get(); }
   const VolumeColour& colour() const { return colour_; }
@@ -76,9 +81,15 @@ class RenderVolume {
   const Box& worldBounds() const { return worldBounds_; }
   /// World-space corners of the voxels above zero, brick by brick; their hull contains all density.
   const std::vector<Vec3f>& outline() const { return outline_; }
+  /// With `coded`, be it made or not.
   std::size_t memoryBytes() const;
 
  private:
+  struct Coded {
+    std::once_flag once;
+    CodedBricks bricks;
+  };
+
   void checkColour(const VolumeColour::Grids& grids, const char* name) const;
   void measureColour();
   bool isOccupied(std::size_t entry) const;
@@ -89,6 +100,7 @@ class RenderVolume {
 
   std::shared_ptr<const BrickGrid> density_;
   VolumeColour colour_;
+  std::shared_ptr<Coded> coded_ = std::make_shared<Coded>();
   std::shared_ptr<const FieldDensity> field_;
   Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;

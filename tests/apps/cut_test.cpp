@@ -229,6 +229,45 @@ TEST_F(CutVerb, CutsLevelSetsAndWritesThem) {
   }
 }
 
+TEST_F(CutVerb, CutsLevelSetsExactlyByLinearCells) {
+  ASSERT_EQ(runProgram("levelset " + ball() + " -o " + file("ball.vdb") + " --resolution 48").exitCode, 0);
+  const std::string input = file("ball.vdb"), tool = meshFile("tool.ply", icosphere(0.5, 2, {0, 1, 0}));
+  struct Way {
+    std::string knives;
+    std::size_t pieces;
+  };
+  // A convex body: as many pieces as combinations of sides, or cells. Two tools that are one cut once.
+  for (const Way& way : std::vector<Way>{{"--random-planes 5 --through-centre", 22},
+                                         {"--voronoi 6", 6},
+                                         {"--plane 0,0,0,1,0,0 --roughness 2%", 2},
+                                         {"--plane 0,0,0,1,0,0 --knife " + tool + " --knife " + tool, 4}}) {
+    cut(input + " " + way.knives + " --explode 0.5 --preview " + file("p.png") + " --size 64x48");
+    const json made = list();
+    EXPECT_EQ(made["geometry"], "exact");
+    EXPECT_EQ(made["pieces"].size(), way.pieces) << way.knives;
+    EXPECT_NEAR(double(made["volume_sum"]) / double(made["volume_original"]), 1, 1e-8) << way.knives;
+    for (const json& p : listedPieces()) {
+      const Mesh mesh = piece(p["file"]);
+      EXPECT_TRUE(topologyOf(mesh).isClosedManifold()) << topologyOf(mesh);
+      // Coordinates that are floats are written with the digits of floats.
+      EXPECT_NEAR(signedVolume(mesh), p["volume"], 1e-8);
+      EXPECT_NE(groupOf(mesh, "inside"), nullptr);
+      EXPECT_FALSE(p["neighbours"].empty());
+    }
+    EXPECT_TRUE(fs::exists(file("out/exploded.obj")));
+  }
+  // A kerf, and the pieces again, which are meshes now.
+  cut(input + " --plane 0,0,0,1,0,0 --kerf 0.04");
+  const double taken = double(list()["volume_original"]) - double(list()["volume_sum"]);
+  EXPECT_NEAR(taken / (M_PI * 0.04), 1, 0.01);  // kerf x area of the disc
+  fs::rename(file("out"), file("first"));
+  cut(file("first") + " --plane 0,0,0,0,1,0");
+  EXPECT_EQ(pieceNames(), (std::vector<std::string>{"piece_0001_0001", "piece_0001_0002", "piece_0002_0001",
+                                                    "piece_0002_0002"}));
+  EXPECT_EQ(attempt(input + " --plane 5,0,0,1,0,0").exitCode, 0);
+  EXPECT_EQ(list()["pieces"].size(), 1u);
+}
+
 TEST_F(CutVerb, VoronoiCellsComeFromPointsOrAreScattered) {
   const std::string input = ball();
   cut(input + " --voronoi 12 --seed 3");

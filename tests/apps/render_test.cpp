@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -78,6 +79,24 @@ TEST_F(RenderVerb, MakesTheSamePictureAtAnyNumberOfThreads) {
     EXPECT_EQ(one.channels[c].values, all.channels[c].values);
 }
 
+TEST_F(RenderVerb, MarchesFewerRaysForAnAdaptivePicture) {
+  const TemporaryFolder folder;
+  const std::string start = "render " + fog() + " --size 160x120 --extinction 4 --octaves 1 -o ";
+  const auto image = [&](const std::string& options) {
+    const ProgramResult result =
+        runProgram(start + folder.file("a.exr") + " --stats " + folder.file("s.json") + options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file("a.exr"));
+  };
+  const Image full = image(""), adaptive = image(" --adaptive 0.05");
+  EXPECT_LT(nlohmann::json::parse(textOf(folder.file("s.json")))["rays"].get<int>(), 160 * 120 * 4 / 2);
+  for (const char* name : {"R", "A"}) {
+    const auto &exact = full.channel(name).values, &near = adaptive.channel(name).values;
+    const float most = *std::max_element(exact.begin(), exact.end());
+    for (std::size_t i = 0; i != exact.size(); ++i) ASSERT_NEAR(near[i], exact[i], 0.05f * most) << name;
+  }
+}
+
 TEST_F(RenderVerb, PathTracesTheSamePicture) {
   const TemporaryFolder folder;
   const std::string start = "render " + fog() +
@@ -129,6 +148,10 @@ TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
                {"--ground=-1", "--ground"},
                {"--step 0", "--step"},
                {"--step -1", "--step"},
+               {"--adaptive 1.5", "--adaptive"},
+               {"--adaptive nan", "--adaptive"},
+               {"--adaptive 0.1 --integrator path", "--adaptive"},
+               {"--adaptive 0.1 --deep d.exr", "--adaptive"},
                {"--fov 200", "--fov"},
                {"--extinction -1", "--extinction"},
                {"--aov depth", "--aov"},

@@ -264,6 +264,79 @@ TEST_F(TransferVerb, CarriesColoursAndNumbersOfVertices) {
   EXPECT_NE(asked.errors.find("cannot hold 'mass'"), std::string::npos) << asked.errors;
 }
 
+TEST_F(TransferVerb, CarriesEveryAttributeOfCornersToAPly) {
+  // Linear over each face, with a jump between the upper and the lower half: on the split faces of the same
+  // ball every corner finds the value of its own face again.
+  Mesh reference = icosphere(1, 2);
+  struct Layer {
+    const char* name;
+    int width;
+  };
+  const Layer layers[] = {{"uv", 2}, {"uv1", 2}, {"color", 4}, {"heat", 1}, {"flow", 3}};
+  const auto value = [](const Layer& layer, const Vec3d& p, int k, bool isUpper) {
+    return 0.5 + 0.25 * p[(k + layer.width) % 3] + (isUpper ? 0.2 : 0.0) * layer.width;
+  };
+  const auto isUpper = [](const Mesh& mesh, std::size_t face) {
+    double sum = 0;
+    for (const std::uint32_t v : mesh.face(face)) sum += mesh.positions[v].y;
+    return sum > 0;
+  };
+  for (const Layer& layer : layers) {
+    MeshAttribute attribute{layer.name, MeshAttribute::Domain::corner, layer.width, {}};
+    for (std::size_t f = 0; f < reference.faceCount(); ++f)
+      for (const std::uint32_t v : reference.face(f))
+        for (int k = 0; k < layer.width; ++k)
+          attribute.values.push_back(float(value(layer, reference.positions[v], k, isUpper(reference, f))));
+    reference.attributes.push_back(std::move(attribute));
+  }
+  Mesh plain = reference;
+  plain.attributes.clear();
+  const Mesh object = midpointSplit(plain);
+  const std::string from = written("from.ply", reference), to = written("to.obj", object);
+  const ProgramResult result =
+      transfer(from, to, withStats("out.ply") + "--align none --quality fast --preview " + file("p.png"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Mesh out = readMesh(file("out.ply"));
+  EXPECT_EQ(out.attributes.size(), std::size(layers));
+  for (const Layer& layer : layers) {
+    const MeshAttribute& carried = attributeOf(out, layer.name);
+    ASSERT_EQ(carried.domain, MeshAttribute::Domain::corner) << layer.name;
+    ASSERT_EQ(carried.width, layer.width) << layer.name;
+    for (std::size_t c = 0; c < out.corners.size(); ++c)
+      for (int k = 0; k < layer.width; ++k)
+        // midpointSplit keeps the four parts of a face together.
+        EXPECT_NEAR(carried.values[c * std::size_t(layer.width) + std::size_t(k)],
+                    value(layer, out.positions[out.corners[c]], k, isUpper(reference, c / 12)), 2e-4)
+            << layer.name << ' ' << c;
+  }
+  // Asked for by name, and where the format holds the coordinates only.
+  ASSERT_EQ(transfer(from, to, "-o " + file("heat.ply") + " --align none --quality fast --attributes heat")
+                .exitCode,
+            0);
+  EXPECT_EQ(attributeOf(readMesh(file("heat.ply")), "heat").values, attributeOf(out, "heat").values);
+  const ProgramResult obj = transfer(from, to, withStats("out.obj") + "--align none --quality fast");
+  ASSERT_EQ(obj.exitCode, 0) << obj.errors;
+  EXPECT_NE(obj.errors.find("cannot hold uv1, color, heat, flow, left out; a .ply can"), std::string::npos)
+      << obj.errors;
+  const ProgramResult asked = transfer(from, to, "-o " + file("other.obj") + " --attributes uv1");
+  EXPECT_EQ(asked.exitCode, 1);
+  EXPECT_NE(asked.errors.find(".ply every attribute"), std::string::npos) << asked.errors;
+}
+
+TEST_F(TransferVerb, CarriesTheSecondTextureCoordinatesOfAGlb) {
+  const std::string box = sharedData("meshes/multi_uv_box.glb");
+  NEPHELE_REQUIRE_SHARED_DATA(box);
+  const std::string to = written("to.obj", readMesh(box));
+  ASSERT_EQ(transfer(box, to, "-o " + file("out.ply") + " --align none --quality fast").exitCode, 0);
+  const Mesh own = readMesh(box), out = readMesh(file("out.ply"));
+  for (const MeshAttribute& a : own.attributes) {
+    if (!a.name.starts_with("uv")) continue;
+    const std::vector<float>& carried = attributeOf(out, a.name).values;
+    ASSERT_EQ(carried.size(), a.values.size());
+    for (std::size_t i = 0; i < carried.size(); ++i) EXPECT_NEAR(carried[i], a.values[i], 1e-5) << a.name;
+  }
+}
+
 TEST_F(TransferVerb, IsTheSameAtAnyThreadCount) {
   const std::string torus = written("torus.obj", torusMesh(0.8, 0.3, 40, 20));
   ASSERT_EQ(transfer(sphere_, torus, withStats("one.obj") + "--threads 1").exitCode, 0);

@@ -8,9 +8,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <filesystem>
 
 #include "levelset/grid_field.h"
+#include "levelset/level_set_pieces.h"
+#include "levelset/marching_cubes.h"
 #include "levelset/mesh_io.h"
 #include "levelset/mesh_pieces.h"
 #include "levelset/mesh_to_level_set.h"
@@ -159,22 +162,72 @@ void corefinedCells(benchmark::State& state) {
                              ratios[ratios.size() / 2], apart));
 }
 
-/// Splitting in turn with making the level set.
+/// Splitting in turn with making the level set: from the level set and the knives to all pieces' level sets
+/// as fields, one of whose values each is read, and their volumes.
 void splitAgainstLevelSet(benchmark::State& state) {
   CutOptions all = options();
   for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
   level();
-  std::vector<double> ratios;
+  const Vec3f middle = box().center();
+  std::vector<double> ratios, processorRatios;
+  std::size_t bytes = 0, count = 0;
   for (auto _ : state) {
+    // Of all processors together, which other programs do not change much.
+    const std::clock_t start = std::clock();
     const double made = secondsOf(
         [&] { benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl()); });
-    const double split = secondsOf([&] { cutIntoPieces(level(), all); });
+    const std::clock_t between = std::clock();
+    Pieces cut;
+    const double split = secondsOf([&] {
+      cut = cutIntoPieces(level(), all);
+      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level.field()(middle));
+    });
+    processorRatios.push_back(double(std::clock() - between) / double(between - start));
+    bytes = 0, count = cut.pieces.size();
+    for (const Piece& piece : cut.pieces) bytes += piece.level.memoryBytes();
     state.SetIterationTime(split);
     ratios.push_back(split / made);
   }
   std::sort(ratios.begin(), ratios.end());
-  state.SetLabel(
-      fmt::format("{:.2f} times the level set, pieces written, with volumes", ratios[ratios.size() / 2]));
+  std::sort(processorRatios.begin(), processorRatios.end());
+  state.SetLabel(fmt::format(
+      "{:.2f} times the level set ({:.2f} to {:.2f}), {:.2f} times its processor time ({:.2f} to {:.2f}), {} "
+      "pieces as fields, {:.0f} MB",
+      ratios[ratios.size() / 2], ratios.front(), ratios.back(), processorRatios[processorRatios.size() / 2],
+      processorRatios.front(), processorRatios.back(), count, double(bytes) / 1e6));
+}
+
+/// A level set by linear cells, in turn with its marching cubes mesh, cut as a mesh.
+void levelSetCells(benchmark::State& state, const LevelSetCutOptions& options, const MeshCutOptions& same) {
+  const auto grid = toBricks(meshToLevelSet(source(), {.voxelSize = double(voxel())}));
+  const auto trianglesOf = [](const MeshPieces& cut) {
+    std::size_t count = 0;
+    for (const MeshPiece& piece : cut.pieces) count += piece.mesh.faceCount();
+    return count;
+  };
+  MeshPieces cells, meshes;
+  std::vector<double> ratios;
+  for (auto _ : state) {
+    const double ours = secondsOf([&] { cells = cutLevelSet(*grid, options); });
+    state.SetIterationTime(ours);
+    ratios.push_back(ours / secondsOf([&] { meshes = cutMesh(marchingCubes(*grid), same); }));
+  }
+  std::sort(ratios.begin(), ratios.end());
+  state.SetItemsProcessed(state.iterations() * std::int64_t(cells.pieces.size()));
+  state.SetLabel(fmt::format("{} pieces of {} triangles; {:.1f} times as long as marching cubes, cut: {}",
+                             cells.pieces.size(), trianglesOf(cells), ratios[ratios.size() / 2],
+                             trianglesOf(meshes)));
+}
+
+void levelSetCellsPlanes(benchmark::State& state) {
+  const auto flat = blades(state.range(0));
+  levelSetCells(state, {.planes = flat}, {.planes = flat});
+}
+
+void levelSetCellsRough(benchmark::State& state) {
+  std::vector<RoughBlade> rough;
+  for (const BladePlane& blade : blades(state.range(0))) rough.push_back({blade, roughness()});
+  levelSetCells(state, {.rough = rough}, {.rough = rough});
 }
 
 void planeCounts(benchmark::internal::Benchmark* bench) {
@@ -191,7 +244,9 @@ BENCHMARK(exactRough)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMillisecond)->U
 BENCHMARK(exactBall)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(exactCells)->Arg(12)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(corefinedCells)->Arg(100)->Unit(benchmark::kMillisecond)->UseManualTime();
-BENCHMARK(splitAgainstLevelSet)->Arg(20)->Unit(benchmark::kMillisecond)->UseManualTime();
+BENCHMARK(levelSetCellsPlanes)->Arg(1)->Arg(20)->Unit(benchmark::kMillisecond)->UseManualTime();
+BENCHMARK(levelSetCellsRough)->Arg(1)->Arg(5)->Unit(benchmark::kMillisecond)->UseManualTime();
+BENCHMARK(splitAgainstLevelSet)->Arg(20)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(15);
 
 }  // namespace
 }  // namespace nephele

@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
+#include <memory>
 
 #include "render/light_volume.h"
 #include "render/march_kernels.h"
@@ -36,8 +37,8 @@ std::shared_ptr<BrickGrid> smoke(int resolution, int low) {
 struct Rays {
   std::shared_ptr<const BrickGrid> grid;
   RenderVolume volume{grid};
-  LightVolume light{volume, {0.3f, 0.8f, 0.4f}};
-  MarchScene scene = test::sceneOf(volume, light);
+  test::SunColumns sun{{volume, {0.3f, 0.8f, 0.4f}}};
+  MarchScene scene = test::sceneOf(volume, sun);
   std::vector<MarchRay> rays;
   std::vector<MarchResult> results;
 
@@ -56,7 +57,7 @@ struct Rays {
       };
       MarchRay& ray = rays.emplace_back();
       ray.density = in(grid->worldToIndex, grid->firstBrick);
-      ray.suns[0] = in(light.worldToLattice(), light.firstBrick());
+      ray.suns[0] = in(sun.light.worldToLattice(), sun.light.firstBrick());
       ray.length = 2;
       for (int n = 0; n != 3; ++n) ray.weight[0][0][n] = 0.1f;
     }
@@ -91,6 +92,30 @@ void marchTile(benchmark::State& state) {
 BENCHMARK(marchTile)->Unit(benchmark::kMillisecond);
 BENCHMARK(marchVectors)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(marchScalar)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
+
+// What the march reads made of a density, and of a sun's columns in their own memory. Items: voxels.
+void codeDensity(benchmark::State& state) {
+  const int n = int(state.range(0));
+  const auto grid = smoke(n, 0);
+  for (auto _ : state) benchmark::DoNotOptimize(CodedBricks(*grid));
+  state.SetItemsProcessed(state.iterations() * n * n * n);
+}
+void codeSun(benchmark::State& state) {
+  const int n = int(state.range(0));
+  const LightVolume light(RenderVolume(smoke(n, 0)), {0.3f, 0.8f, 0.4f});
+  for (auto _ : state) {
+    state.PauseTiming();
+    auto coded = std::make_unique<LightVolume>(light);
+    state.ResumeTiming();
+    coded->code();
+    state.PauseTiming();
+    coded.reset();
+    state.ResumeTiming();
+  }
+  state.SetItemsProcessed(state.iterations() * n * n * n);
+}
+BENCHMARK(codeDensity)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(codeSun)->Arg(128)->Arg(256)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // Items: bricks that hold density.
 void sunOfAShell(benchmark::State& state) {

@@ -321,36 +321,67 @@ TEST(CumuloGrids, StopsWhenCancelled) {
       Cancelled);
 }
 
+/// The samples of a field with every brick at a place of its own, as smoothing takes them.
+detail::BrickSamples samplesOf(const ScalarField& field) {
+  detail::BrickSamples samples = detail::bakeSamples(
+      field, {.voxelSize = 0.1f, .box = kSphereBox, .interpolation = Interpolation::tricubic});
+  samples.separate();
+  return samples;
+}
+
+float sampleAt(const detail::BrickSamples& samples, const Vec3i& voxel) {
+  const float* brick = samples.pool[std::size_t(samples.poolIndex(brickOf(voxel)))];
+  return brick[detail::BrickSamples::offset(insideBrick(voxel.x), insideBrick(voxel.y),
+                                            insideBrick(voxel.z))];
+}
+
 TEST(MedialSmoothing, LeavesAFieldWithoutJumpsAlone) {
   const ScalarField smooth = perlin({.frequency = 1});
-  const auto grid = bakeGrid(smooth, {.voxelSize = 0.1f, .box = kSphereBox});
-  const std::vector<float> before = grid->values;
-  EXPECT_EQ(smoothMedialJumps(*grid, {.jump = 2.0f}), 0u);
-  EXPECT_EQ(grid->values, before);
+  detail::BrickSamples samples = samplesOf(smooth);
+  const MedialSmoothing done = smoothMedialJumps(samples, {.jump = 2.0f});
+  EXPECT_EQ(done.diffused, 0u);
+  EXPECT_EQ(std::count(done.signless.begin(), done.signless.end(), true), 0);
+  const detail::BrickSamples before = samplesOf(smooth);
+  ASSERT_EQ(samples.pool.size(), before.pool.size());
+  for (std::size_t b = 0; b < before.pool.size(); ++b)
+    EXPECT_TRUE(std::equal(before.pool[b], before.pool[b] + detail::BrickSamples::kCount, samples.pool[b]));
 }
 
 TEST(MedialSmoothing, DiffusesAStepAndKeepsEverythingElse) {
   // 1 for x < 0, 3 for x >= 0.
   const float voxel = 0.1f;
   const ScalarField step = mask(plane({-0.5f * voxel, 0, 0}, {1, 0, 0})) * 2.0f + 1.0f;
-  const auto grid =
-      bakeGrid(step, {.voxelSize = voxel, .box = kSphereBox, .interpolation = Interpolation::tricubic});
-  EXPECT_GT(smoothMedialJumps(*grid, {.jump = 1.0f, .dilation = 4, .steps = 400}), 0u);
+  detail::BrickSamples samples = samplesOf(step);
+  EXPECT_GT(smoothMedialJumps(samples, {.jump = 1.0f, .dilation = 4, .steps = 400}).diffused, 0u);
   float largest = 0;
   for (int i = -8; i < 8; ++i)
-    largest = std::max(largest, std::abs(grid->at({i + 1, 0, 0}) - grid->at({i, 0, 0})));
+    largest = std::max(largest, std::abs(sampleAt(samples, {i + 1, 0, 0}) - sampleAt(samples, {i, 0, 0})));
   // A straight line over the ten marked samples between held values 1 and 3 falls by 2 / 11 per voxel.
   EXPECT_NEAR(largest, 2.0f / 11, 0.002f);
-  EXPECT_EQ(grid->at({-6, 0, 0}), 1.0f);
-  EXPECT_EQ(grid->at({5, 0, 0}), 3.0f);
+  EXPECT_EQ(sampleAt(samples, {-6, 0, 0}), 1.0f);
+  EXPECT_EQ(sampleAt(samples, {5, 0, 0}), 3.0f);
+}
+
+TEST(MedialSmoothing, KeepsSignsAfterAnOddNumberOfSteps) {
+  // -1 for x < 0, 3 for x >= 0: magnitudes meet in the middle, signs stay. After one step the samples on both
+  // sides are means of seven: (6 * 1 + 3) / 7 and (6 * 3 + 1) / 7.
+  const ScalarField step = mask(plane({-0.05f, 0, 0}, {1, 0, 0})) * 4.0f - 1.0f;
+  detail::BrickSamples samples = samplesOf(step);
+  smoothMedialJumps(samples, {.jump = 1.0f, .dilation = 1, .steps = 1});
+  EXPECT_FLOAT_EQ(sampleAt(samples, {-1, 2, 2}), -9.0f / 7);
+  EXPECT_FLOAT_EQ(sampleAt(samples, {0, 2, 2}), 19.0f / 7);
 }
 
 TEST(MedialSmoothing, DropsTheSignAcrossAJump) {
   // +1 and -1: the displacement is 1 on both sides; interpolating the sign would cut it down to 0.
   const ScalarField flip = mask(plane({0.05f, 0, 0}, {1, 0, 0})) * 2.0f - 1.0f;
-  const auto grid =
-      bakeGrid(flip, {.voxelSize = 0.1f, .box = kSphereBox, .interpolation = Interpolation::tricubic});
-  smoothMedialJumps(*grid, {.jump = 1.0f, .dilation = 0});
+  detail::BrickSamples samples = samplesOf(flip);
+  const MedialSmoothing done = smoothMedialJumps(samples, {.jump = 1.0f, .dilation = 0});
+  std::vector<detail::Packing> packing;
+  for (const bool signless : done.signless)
+    packing.push_back(signless ? detail::Packing::absolute : detail::Packing::whole);
+  const auto grid = detail::emptyPackedGrid(samples);
+  detail::appendPacked(*grid, std::move(samples), packing);
   const ScalarField displacement = abs(gridField(grid, Interpolation::tricubic));
   for (const float x : {-0.04f, 0.0f, 0.03f, 0.05f, 0.08f, 0.1f})
     EXPECT_NEAR(displacement({x, 0, 0}), 1.0f, 1e-5f);

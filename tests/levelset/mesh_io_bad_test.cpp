@@ -83,6 +83,8 @@ TEST(MeshIoBad, FaultsAreNamedWithTheirLine) {
   const std::string ply =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
   const std::string faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string lists =
+      "element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float heat\nend_header\n";
   const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
   const std::string v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   const Fault faults[] = {
@@ -103,6 +105,10 @@ TEST(MeshIoBad, FaultsAreNamedWithTheirLine) {
       {"a.ply", ply + faces + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n",
        "line 11: vertex 2 of 3: coordinate y is not finite"},
       {"a.ply", ply + faces + points, "face 1 of 1: the file ends here"},
+      {"a.ply", ply + lists + points + "3 0 1 2 3 1 2\n", "face 1 of 1: the file ends here"},
+      {"a.ply", ply + lists + points + "3 0 1 2 255 1 2 3\n", "a list of 255 values is longer than the file"},
+      {"a.ply", ply + lists + points + "3 0 1 2 -3 1 2 3\n", "list length -3 makes no sense"},
+      {"a.ply", ply + lists + points + "3 0 1 2 3 1 x 3\n", "line 14: face 1 of 1: expected a number"},
       {"a.ply", "ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n0\n",
        "is cut short"},
       {"a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n",
@@ -228,6 +234,20 @@ TEST(MeshIoBad, MutatedOffEndsInAMeshOrAnError) {
   mutate("a.off",
          "COFF\n4 4 6\n0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n0 0 1 9 9 9\n3 0 2 1\n3 0 1 3\n3 1 2 "
          "3\n3 2 0 3\n");
+}
+
+TEST(MeshIoBad, MutatedAttributesOfCornersEndInAMeshOrAnError) {
+  const TemporaryFolder folder;
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const auto& f : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}})
+    mesh.addFace(f);
+  for (const auto& [name, width] : {std::pair{"uv", 2}, std::pair{"uv1", 2}, std::pair{"color", 4}}) {
+    mesh.attributes.push_back({name, MeshAttribute::Domain::corner, width, {}});
+    for (int i = 0; i < 12 * width; ++i) mesh.attributes.back().values.push_back(float(i) / 48);
+  }
+  writeMesh(folder.file("a.ply"), mesh);
+  mutate("a.ply", test::textOf(folder.file("a.ply")));
 }
 
 }  // namespace

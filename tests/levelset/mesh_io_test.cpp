@@ -374,6 +374,92 @@ TEST(MeshIo, PlyRoundTripKeepsPolygonsAttributesAndDigits) {
   EXPECT_EQ(find(back, "mass")->values, mesh.attributes[2].values);
 }
 
+// Corner c has 10 c, 10 c + 1, ... per attribute, which no two corners share.
+Mesh withCornerAttributes() {
+  Mesh mesh = decorated();
+  for (const auto& [name, width] :
+       {std::pair{"uv1", 2}, std::pair{"color_corner", 3}, std::pair{"heat", 1}, std::pair{"flow", 5}}) {
+    MeshAttribute attribute{name, MeshAttribute::Domain::corner, width, {}};
+    for (std::size_t c = 0; c < mesh.corners.size(); ++c)
+      for (int k = 0; k < width; ++k) attribute.values.push_back(float(10 * c) + float(k) + 0.1f);
+    mesh.attributes.push_back(std::move(attribute));
+  }
+  return mesh;
+}
+
+TEST(MeshIo, PlyRoundTripKeepsEveryAttributeOfCorners) {
+  const TemporaryFolder folder;
+  const Mesh mesh = withCornerAttributes();
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.attributes.size(), mesh.attributes.size());
+  for (const MeshAttribute& a : mesh.attributes) {
+    const MeshAttribute* b = find(back, a.name);
+    ASSERT_NE(b, nullptr) << a.name;
+    EXPECT_EQ(b->domain, a.domain) << a.name;
+    EXPECT_EQ(b->width, a.width) << a.name;
+    EXPECT_EQ(b->values, a.values) << a.name;
+  }
+}
+
+TEST(MeshIo, PlyHasColoursOfCornersAsMeshLabHasThem) {
+  // As VCGlib's importer and exporter do: a list "color" of three floats per corner; opacity beside it.
+  const TemporaryFolder folder;
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const auto& f : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}}) mesh.addFace(f);
+  for (const int width : {3, 4}) {
+    MeshAttribute color{"color", MeshAttribute::Domain::corner, width, {}};
+    for (int i = 0; i < 6 * width; ++i) color.values.push_back(float(i) / 24);
+    mesh.attributes = {color};
+    writeMesh(folder.file("a.ply"), mesh);
+    const std::string text = test::textOf(folder.file("a.ply"));
+    EXPECT_NE(text.find("property list uchar float color\n"), std::string::npos);
+    EXPECT_EQ(text.find("property list uchar float alpha\n") != std::string::npos, width == 4);
+    const Mesh back = readMesh(folder.file("a.ply"));
+    ASSERT_EQ(back.attributes.size(), 1u);
+    EXPECT_EQ(back.attributes[0].name, "color");
+    EXPECT_EQ(back.attributes[0].width, width);
+    EXPECT_EQ(back.attributes[0].values, color.values);
+  }
+}
+
+TEST(MeshIo, TextPlyHasAttributesOfCornersToo) {
+  const Mesh mesh = readText(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element face 2\nproperty list uchar float heat\nproperty list uchar int vertex_indices\n"
+      "property list uchar double color\nproperty list uchar float texcoord\n"
+      "property list int int neighbours\nend_header\n"
+      "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
+      "3 1 2 3 3 0 1 2 9 0 0 0 .5 .5 .5 1 1 1 6 0 0 1 0 0 1 3 7 8 9\n"
+      "3 4 5 6 3 2 1 0 9 1 0 0 0 1 0 0 0 1 6 1 1 0 1 1 0 3 7 8 9\n");
+  EXPECT_EQ(mesh.attributes.size(), 4u) << "lists of whole numbers are none";
+  EXPECT_EQ(find(mesh, "heat")->values, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(find(mesh, "uv")->width, 2);
+  EXPECT_EQ(find(mesh, "color")->domain, MeshAttribute::Domain::vertex) << "they have the name";
+  EXPECT_EQ(find(mesh, "color_corner")->values,
+            (std::vector<float>{0, 0, 0, .5f, .5f, .5f, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
+TEST(MeshIo, PlyListsThatDoNotBelongToCornersArePassedOver) {
+  const auto readWith = [](const char* header, const char* first, const char* second) {
+    return readText("a.ply", std::string("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                                         "property float y\nproperty float z\nelement face 2\n"
+                                         "property list uchar int vertex_indices\nproperty ") +
+                                 header + "\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 " + first +
+                                 "\n4 0 1 3 2 " + second + "\n");
+  };
+  EXPECT_EQ(readWith("list uchar float a", "3 1 2 3", "4 1 2 3 4").attributes.size(), 1u);
+  // Not the same number for each corner; missing at a face; no multiple of the corners.
+  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "8 1 2 3 4 5 6 7 8").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "0", "4 1 2 3 4").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "0").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "2 1 2", "2 1 2").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "0", "0").attributes.empty());
+}
+
 TEST(MeshIo, PlyPutsTextureCoordinatesOnVerticesWhereTheyAgree) {
   const TemporaryFolder folder;
   Mesh mesh = decorated();
@@ -394,8 +480,14 @@ TEST(MeshIo, PlyHoldsPolygonsOfMoreThan255Corners) {
     loop.push_back(i);
   }
   mesh.addFace(loop);
+  MeshAttribute weight{"weight", MeshAttribute::Domain::corner, 1, std::vector<float>(300)};
+  for (std::size_t c = 0; c < 300; ++c) weight.values[c] = float(c);
+  mesh.attributes.push_back(weight);
   writeMesh(folder.file("a.ply"), mesh);
-  EXPECT_EQ(readMesh(folder.file("a.ply")).corners, mesh.corners);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.corners, mesh.corners);
+  ASSERT_EQ(back.attributes.size(), 1u);
+  EXPECT_EQ(back.attributes[0].values, weight.values);
 }
 
 TEST(MeshIo, StlRoundTripIsTheTriangulationInFloats) {

@@ -313,6 +313,8 @@ TEST(RelaxImages, RejectsBadOptions) {
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.rounds = -1}), Error);
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.areaWeight = 0}), Error);
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.limit = 0}), Error);
+  EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.resistsFrom = -0.1}), Error);
+  EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.resistsFrom = 1.1}), Error);
 }
 
 }  // namespace

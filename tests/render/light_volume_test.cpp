@@ -7,6 +7,7 @@
 #include "modeling/error.h"
 #include "render/lights.h"
 #include "tests/support/density.h"
+#include "tests/support/each_target.h"
 
 namespace nephele {
 namespace {
@@ -138,6 +139,16 @@ TEST(LightVolume, CrossesEmptyGaps) {
     EXPECT_NEAR(light.columnDensity({0, 0, below}), 0.75f / std::fabs(towards.z), 2e-3f);
     EXPECT_NEAR(light.columnDensity({0, 0, -below}), 0.25f / std::fabs(towards.z), 2e-3f);
   }
+}
+
+TEST(LightVolume, IsTheSameBitForBitWithEveryInstructionSet) {
+  // Every lane does the same sums in the same order.
+  const RenderVolume volume(ball(1.0f, 0.1f, 2.0f));
+  const LightVolume widest(volume, {0.4f, -0.8f, 0.3f});
+  test::forEachTarget([&] {
+    const LightVolume other(volume, {0.4f, -0.8f, 0.3f});
+    EXPECT_TRUE(widest.values() == other.values());
+  });
 }
 
 TEST(LightVolume, RefusesALightFromNowhere) {

@@ -23,12 +23,13 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
     return std::fmax(0.0f, std::sin(3 * p.x) * std::cos(4 * p.y) + std::sin(5 * p.z));
   });
   const RenderVolume volume(grid);
-  const LightVolume light(volume, {0.3f, 0.8f, 0.4f});
+  const test::SunColumns sun({volume, {0.3f, 0.8f, 0.4f}});
+  const LightVolume& light = sun.light;
   std::vector<float> sky(5 * 4 * 3);
   for (std::size_t i = 0; i != sky.size(); ++i) sky[i] = 0.5f + 0.4f * std::sin(float(i));
   const Affine toSky{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
 
-  MarchScene scene = test::sceneOf(volume, light);
+  MarchScene scene = test::sceneOf(volume, sun);
   // Three colours of the sun, of which green has none, and of the sky.
   scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
   scene.scatteredSize = {5, 4, 2};
@@ -79,8 +80,9 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
 TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
   const auto grid = test::ball(1.0f, 0.1f);
   const RenderVolume volume(grid);
-  const LightVolume light(volume, {0, 0, 1});
-  MarchScene scene = test::sceneOf(volume, light);
+  const test::SunColumns sun({volume, {0, 0, 1}});
+  const LightVolume& light = sun.light;
+  MarchScene scene = test::sceneOf(volume, sun);
   scene.extinction = 1.5f;
   scene.step = 0.05f;
   const HoldoutCurve::Knot knots[] = {{8.5f, 0}, {9.0f, 0.4f}, {9.0f, 0.9f}, {9.3f, 1.0f}};

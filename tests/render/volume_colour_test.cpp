@@ -252,8 +252,9 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
   const auto glow = densityGrid(voxels(0.1f), low, high,
                                 [](const Vec3f& p) { return std::fmax(0.0f, std::sin(2 * p.x + p.y)); });
   const RenderVolume volume(grid, {coloured(*grid, {0.9f, 0.5f, 0.2f}), coloured(*glow, {2, 1, 0.5f})});
-  const LightVolume light(volume, {0.3f, 0.8f, 0.4f});
-  MarchScene scene = test::sceneOf(volume, light);
+  const test::SunColumns sun({volume, {0.3f, 0.8f, 0.4f}});
+  const LightVolume& light = sun.light;
+  MarchScene scene = test::sceneOf(volume, sun);
   const auto set = [](const VolumeColour::Grids& grids, MarchScene::ColourBricks& bricks) {
     for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values.data();
     bricks.table = grids[0]->table.data();

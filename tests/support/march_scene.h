@@ -10,17 +10,26 @@ namespace nephele::test {
 inline MarchScene sceneOf(const RenderVolume& volume) {
   const BrickGrid& grid = volume.density();
   MarchScene scene;
-  scene.density = {grid.values.data(), grid.table.data(), grid.brickCount};
+  scene.density = {grid.values.data(), grid.table.data(), grid.brickCount, volume.coded().pairs(),
+                   volume.coded().entries()};
   scene.ranges = grid.ranges.data();
   scene.emptiness = volume.emptiness().data();
   scene.uniformity = volume.uniformity().data();
   return scene;
 }
 
-/// With the sun whose columns are in `light`.
-inline MarchScene sceneOf(const RenderVolume& volume, const LightVolume& light) {
+/// A sun's columns as they were worked out, for the scalar loop, and coded, for the vectors.
+struct SunColumns {
+  LightVolume light, coded = light;
+
+  explicit SunColumns(LightVolume itsLight) : light(std::move(itsLight)) { coded.code(); }
+};
+
+/// With the sun whose columns are `sun`, which must outlive the result, too.
+inline MarchScene sceneOf(const RenderVolume& volume, const SunColumns& sun) {
   MarchScene scene = sceneOf(volume);
-  scene.suns.push_back({{light.values().data(), light.table().data(), light.brickCount()}});
+  scene.suns.push_back({{sun.light.values().data(), sun.light.table().data(), sun.light.brickCount(),
+                         sun.coded.coded().pairs(), sun.coded.coded().entries()}});
   return scene;
 }
 

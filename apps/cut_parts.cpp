@@ -1,0 +1,79 @@
+// What the verb cut cuts, and what it writes.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/cut_options.h"
+#include "levelset/cut_input.h"
+#include "levelset/level_set_pieces.h"
+#include "levelset/marching_cubes.h"
+#include "levelset/mesh_io.h"
+#include "modeling/error.h"
+
+namespace nephele::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<CutPart> readInput(const CutArguments& a, Run& run) {
+  if (fs::is_directory(a.input)) return readPieces(a.input, run);
+  CutPart part;
+  if (const std::string name = fs::path(a.input).stem().string(); isPieceName(name)) {
+    part.name = name;
+    part.parent = "";
+  }
+  if (isVolumeFile(a.input)) {
+    part.level = readLevelSet(a.input);
+    const bool isExact = a.geometry == CutArguments::Geometry::exact;
+    part.mesh = isExact ? marchingTetrahedra(*part.level, run) : marchingCubes(*part.level);
+    if (part.mesh.faceCount() == 0) throw Error(a.input + ": its level set has no surface");
+  } else {
+    part.mesh = readMesh(a.input);
+  }
+  std::vector<CutPart> parts;
+  parts.push_back(std::move(part));
+  return parts;
+}
+
+}  // namespace
+
+std::vector<CutPart> CutArguments::readParts(Run& run) const {
+  run.begin("read");
+  std::vector<CutPart> parts = readInput(*this, run);
+  const bool isListed = fs::exists(fs::path(input) / "pieces.json");
+  // What a cut has made is whole, and may hold places that are equal and must not be merged.
+  if (!isListed && !isVolumeFile(input)) {
+    run.begin("repair");
+    for (CutPart& part : parts) {
+      RepairedMesh repaired = repairMesh(part.mesh, repair, run);
+      for (const std::string& what : repaired.repairs)
+        run.note(parts.size() > 1 ? fmt::format("{}: {}", part.name, what) : what);
+      part.mesh = std::move(repaired.mesh);
+    }
+  }
+  std::size_t triangles = 0;
+  for (const CutPart& part : parts) triangles += part.mesh.faceCount();
+  // Of a cut, its pieces and their text.
+  constexpr double kBytesPerTriangle = 1500;
+  run.requireMemory(kBytesPerTriangle * double(triangles), "cut a coarser mesh");
+  return parts;
+}
+
+bool CutArguments::isModel() const {
+  return !isVolumeFile(input) && !fs::is_directory(input);
+}
+
+PieceFilesOptions CutArguments::files(const CutKnives& knives, const Run& run) const {
+  PieceFilesOptions files{.folder = folder, .format = format, .explode = explode};
+  if (levelSets) files.levelSetVoxelSize = knives.voxelSize;
+  files.source = input;
+  files.geometry = geometry == Geometry::exact ? "exact" : "levelset";
+  files.knives = knives.names;
+  files.cells = knives.exact.cells;
+  files.kerf = double(knives.exact.kerf);
+  files.metadata = run.metadata();
+  files.metadata["seed"] = std::to_string(seed);
+  return files;
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+
+namespace nephele::detail {
+
+/// Nodes of a brick's slice in LightVolume, in rows that are a round number of the widest vectors; what lies
+/// behind the ninth of a row does not matter.
+inline constexpr int kSliceNodes = 9, kSliceRow = 16, kSliceArea = kSliceNodes * kSliceRow;
+struct alignas(64) SliceNodes : std::array<float, kSliceArea> {};
+
+/// What four samples in a row count for, across the light.
+struct SliceWeights {
+  std::array<float, 4> u, v;
+};
+
+/// Mixes 12 x 12 samples, `kSliceRow` apart from row to row, into the nodes of a slice. Reads 3 samples more
+/// behind the last row.
+void mixSlice(const float* samples, const SliceWeights& weights, SliceNodes& out);
+
+/// out = end (a + b) + middle (c + d): Simpson's rule with its middle in two halves.
+void addSlices(float end, const SliceNodes& a, const SliceNodes& b, float middle, const SliceNodes& c,
+               const SliceNodes& d, SliceNodes& out);
+
+/// sum += after
+void addSlice(const SliceNodes& after, SliceNodes& sum);
+
+/// Densities at a slice and the ones before and behind it on the light's way, and what lies between them.
+struct Slices {
+  SliceNodes *previous, *density, *next, *before, *after;
+};
+
+/// Writes the 9 x 9 nodes of a slice side by side: `sum` less `share` times what the density grows by in the
+/// cells before and behind it, weighted by what these hold.
+void storeSlice(const SliceNodes& sum, const Slices& at, float share, float* out);
+
+}  // namespace nephele::detail
