@@ -32,9 +32,13 @@ void mixSliceOf(const float* HWY_RESTRICT samples, const detail::SliceWeights& w
                 float* HWY_RESTRICT out) {
   using namespace detail;
   const SliceLanes d;
-  alignas(64) float rows[(kSliceNodes + 3) * kSliceRow];
+  alignas(64) float dense[(kSliceNodes + 4) * kSliceRow], rows[(kSliceNodes + 3) * kSliceRow];
   for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)
-    hn::Store(mixOfFour(samples + i, 1, weights.u), d, rows + i);
+    hn::Store(hn::Max(hn::LoadU(d, samples + i), hn::Zero(d)), d, dense + i);
+  // Only lanes that do not matter look behind the last row.
+  std::fill_n(dense + (kSliceNodes + 3) * kSliceRow, kSliceRow, 0.0f);
+  for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)
+    hn::Store(mixOfFour(dense + i, 1, weights.u), d, rows + i);
   for (int i = 0; i != kSliceArea; i += kSliceLanes)
     hn::Store(mixOfFour(rows + i, kSliceRow, weights.v), d, out + i);
 }

@@ -14,8 +14,8 @@ struct SliceWeights {
   std::array<float, 4> u, v;
 };
 
-/// Mixes 12 x 12 samples, `kSliceRow` apart from row to row, into the nodes of a slice. Reads 3 samples more
-/// behind the last row.
+/// Mixes 12 x 12 samples, `kSliceRow` apart from row to row, into the nodes of a slice; samples below 0
+/// count as 0.
 void mixSlice(const float* samples, const SliceWeights& weights, SliceNodes& out);
 
 /// out = end (a + b) + middle (c + d): Simpson's rule with its middle in two halves.

@@ -101,13 +101,18 @@ struct LightVolume::Sweep {
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
         const bool holds = grid.ranges[std::size_t(pool)].max > 0;
         patch.empty = patch.empty && !holds;
-        const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w];
+        const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w] +
+                            (insideBrick(u1) + 1) * sampleStride[u];
+        const int count = u2 - u1;
         for (int y = v1; y != v2; ++y) {
-          const float* source =
-              from + (insideBrick(y) + 1) * sampleStride[v] + (insideBrick(u1) + 1) * sampleStride[u];
+          const float* source = from + (insideBrick(y) + 1) * sampleStride[v];
           float* row = patch.samples.data() + (y - patch.v) * kPitch + (u1 - patch.u);
-          for (int x = 0; x != u2 - u1; ++x)
-            row[x] = holds ? std::max(source[x * sampleStride[u]], 0.0f) : 0.0f;
+          if (!holds)
+            std::fill_n(row, count, 0.0f);
+          else if (count == size && sampleStride[u] == 1)
+            std::copy_n(source, size, row);
+          else
+            for (int x = 0; x != count; ++x) row[x] = source[x * sampleStride[u]];
         }
         u1 = u2;
       }
