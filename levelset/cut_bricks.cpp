@@ -16,6 +16,7 @@
 #include <numeric>
 
 #include "levelset/cut_kernels.h"
+#include "levelset/grid_field.h"
 #include "levelset/lattice.h"
 #include "modeling/error.h"
 #include "modeling/field_node.h"
@@ -66,6 +67,21 @@ struct BrickPoints {
 };
 static_assert(kSamples == 2 * kBlockSize);
 
+/// The grid behind a shape if its voxels stand where those of the cut do, or null.
+std::shared_ptr<const BrickGrid> gridInPlace(const ScalarField& shape, float voxelSize) {
+  std::shared_ptr<const BrickGrid> grid = gridOf(shape);
+  const Affine places{Mat3f::scaling(voxelSize), {}};
+  const bool isInPlace = grid && !grid->isPacked() && grid->indexToWorld.linear == places.linear &&
+                         grid->indexToWorld.translation == places.translation;
+  return isInPlace ? grid : nullptr;
+}
+
+void copyBrick(const BrickGrid& grid, const Vec3i& brick, float* samples) {
+  const float* stored = grid.brick(grid.poolIndex(brick));
+  for (int row = 0; row < kBrick * kBrick; ++row)
+    std::copy_n(stored + sampleOffset(0, row % kBrick, row / kBrick), kBrick, samples + row * kBrick);
+}
+
 void divideBySlope(std::span<float> values, const std::array<const float*, 3>& slopes) {
   for (std::size_t s = 0; s < values.size(); ++s) {
     const float slope = length(Vec3f{slopes[0][s], slopes[1][s], slopes[2][s]});
@@ -101,8 +117,11 @@ struct SampledBlock {
 /// Parts the samples of one brick after the other.
 class Sampler {
  public:
-  Sampler(const CutOptions& options, SampledBlock& block)
-      : options_(options),
+  /// `grid` holds the samples of `shape`, or is null.
+  Sampler(const ScalarField& shape, const BrickGrid* grid, const CutOptions& options, SampledBlock& block)
+      : shape_(shape),
+        grid_(grid),
+        options_(options),
         block_(block),
         h_(options.voxelSize),
         band_(options.bandVoxels * options.voxelSize),
@@ -127,8 +146,12 @@ class Sampler {
     Scratch& scratch = Scratch::local();
     Scratch::Frame frame(scratch);
     const BrickPoints points(candidate.cube.brick, h_, scratch, frame);
-    for (std::size_t half = 0; half < 2; ++half)
-      candidate.cube.shape.node()->eval(points.blocks[half], {samples + half * kBlockSize}, scratch);
+    const auto& shape = candidate.cube.shape.node();
+    if (grid_ && shape == shape_.node())
+      copyBrick(*grid_, candidate.cube.brick, samples);
+    else
+      for (std::size_t half = 0; half < 2; ++half)
+        shape->eval(points.blocks[half], {samples + half * kBlockSize}, scratch);
     if (sidesOf(samples, -band_).above.isEmpty()) return false;
     const CutKnowledge& known = *candidate.cube.known;
     open_.clear();
@@ -189,6 +212,8 @@ class Sampler {
     open_.swap(next_);
   }
 
+  const ScalarField& shape_;
+  const BrickGrid* grid_;
   const CutOptions& options_;
   SampledBlock& block_;
   float h_, band_, halfKerf_;
@@ -387,11 +412,12 @@ class Walk {
       if (!candidate.isUniform) count += (1 + candidate.cube.known->undecided.size()) * kSamples;
     }
     result.samples = LargeArray(count);
+    const std::shared_ptr<const BrickGrid> grid = gridInPlace(shape_, h_);
     std::vector<SampledBlock> blocks((candidates_.size() + kBricksPerTask - 1) / kBricksPerTask);
     parallelFor(
         candidates_.size(), kBricksPerTask,
         [&](std::size_t begin, std::size_t end) {
-          Sampler sampler(options_, blocks[begin / kBricksPerTask]);
+          Sampler sampler(shape_, grid.get(), options_, blocks[begin / kBricksPerTask]);
           for (std::size_t i = begin; i < end; ++i)
             sampler.add(candidates_[i], result.samples.data() + candidates_[i].firstSample);
         },

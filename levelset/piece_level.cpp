@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
+#include "levelset/brick_volume.h"
+#include "levelset/cut_kernels.h"
 #include "levelset/memory_chunks.h"
 #include "modeling/error.h"
 #include "modeling/field_node.h"
+#include "modeling/parallel.h"
 
 namespace nephele {
 
@@ -100,6 +104,51 @@ float PieceLevel::at(const Vec3i& voxel) const {
 ScalarField PieceLevel::field() const {
   require(table_ != nullptr, "PieceLevel: holds nothing");
   return ScalarField(std::make_shared<detail::PieceLevelNode>(*this));
+}
+
+double PieceLevel::volume() const {
+  require(table_ != nullptr, "PieceLevel: holds nothing");
+  // By table entry and by place among the bricks that hold samples, which come after the two ends.
+  std::vector<const float*> samples(2);
+  std::vector<detail::BrickMask> inside{{}, detail::BrickMask::all()};
+  std::array<std::array<float, kSamples>, 2> ends;
+  ends[kOutside].fill(-band_);
+  ends[kInside].fill(band_);
+  for (std::size_t end = 0; end < ends.size(); ++end) samples[end] = ends[end].data();
+  Table places = *table_;
+  for (std::int32_t& entry : places.entries) {
+    if (entry <= kInside) continue;
+    samples.push_back(samplesOf(entry));
+    inside.push_back(detail::sidesOf(samples.back(), 0).above);
+    entry = std::int32_t(samples.size()) - 1;
+  }
+  // The cells before the first samples have corners in the table's first bricks.
+  const Vec3i first = places.firstBrick - Vec3i{1, 1, 1}, count = places.brickCount + Vec3i{1, 1, 1};
+  const auto shareOf = [&](const Vec3i& at, detail::BrickCells& cells) {
+    std::array<std::size_t, 8> corners;
+    for (int i = 0; i < 8; ++i)
+      corners[std::size_t(i)] = std::size_t(places.entryAt(at + Vec3i{i & 1, i >> 1 & 1, i >> 2}));
+    if (corners[0] <= kInside &&
+        std::all_of(corners.begin(), corners.end(), [&](std::size_t corner) { return corner == corners[0]; }))
+      return 0.0;
+    std::array<detail::BrickMask, 8> masks;
+    for (std::size_t i = 0; i < 8; ++i) {
+      masks[i] = inside[corners[i]];
+      cells.samples[i] = samples[corners[i]];
+    }
+    cells.setInside(masks);
+    const detail::BrickMask mixed = cells.mixed();
+    return mixed.isEmpty() ? 0.0 : detail::volumeShare(cells, mixed, at * kBrick);
+  };
+  std::vector<double> slices(std::size_t(count.z));
+  parallelFor(slices.size(), 1, [&](std::size_t begin, std::size_t end) {
+    detail::BrickCells cells;
+    for (std::size_t z = begin; z < end; ++z)
+      for (int y = 0; y < count.y; ++y)
+        for (int x = 0; x < count.x; ++x) slices[z] += shareOf(first + Vec3i{x, y, int(z)}, cells);
+  });
+  const double voxel = double(voxelSize_);
+  return std::accumulate(slices.begin(), slices.end(), 0.0) * voxel * voxel * voxel;
 }
 
 std::shared_ptr<BrickGrid> PieceLevel::toBricks() const {

@@ -64,6 +64,10 @@ class PieceLevel {
   /// copy, for a few samples of many pieces.
   ScalarField field() const;
 
+  /// Volume of the marching cubes mesh of its samples, which is not made, world units cubed. The time is that
+  /// of reading all bricks that hold samples: keep it.
+  double volume() const;
+
   /// A copy with borders: for interpolation of many points, and for all that works on grids. 2.6 times the
   /// memory.
   std::shared_ptr<BrickGrid> toBricks() const;

@@ -3,7 +3,7 @@
 // cut_bricks.cpp finds, for every brick, the samples inside the shape by the sides of all knives, numbered as
 // they occur; the 2^N others never appear. Here, shells hang together within a brick by growing bit sets, and
 // between bricks by union-find. Every brick lists the shells that come near it, so that what follows goes
-// over bricks, each read once for all its shells: first their volumes, which tell slivers, then
+// over bricks, each read once for all its shells: first the volumes of those that may be slivers, then
 // min(shape, +-knives) of those that stay, written where their surfaces are. Shells of one combination are
 // one piece if a straight line joins them inside the shape and between the blades: thin wedges fall apart on
 // a grid, but not in fact.
@@ -151,10 +151,7 @@ class Cutter {
         progress_(progress),
         h_(options.voxelSize),
         band_(options.bandVoxels * options.voxelSize),
-        halfKerf_(options.kerf / 2) {
-    lowest_.fill(-band_);
-    highest_.fill(band_);
-  }
+        halfKerf_(options.kerf / 2) {}
 
   Pieces run() {
     progress_.begin("find pieces");
@@ -335,8 +332,7 @@ class Cutter {
     }
     giveTo(pieceOf);
     codeOfOwner_ = std::move(codes);
-    std::vector<double> volumes(groups.size(), 0.0);
-    std::vector<PieceLevel> levels = writeLevels(volumes);
+    std::vector<PieceLevel> levels = writeLevels(groups.size());
     for (std::uint32_t g = 0; g < groups.size(); ++g) {
       Piece& piece = result.pieces.emplace_back();
       const CutCode& code = cut_.codes[codeOfOwner_[g]];
@@ -345,7 +341,6 @@ class Cutter {
         piece.code.sides[k] = detail::bitOf(code.sides, k);
       if (code.cell != CutCode::kNoCell) piece.cell = code.cell;
       piece.level = std::move(levels[g]);
-      piece.volume = volumes[g] * voxel;
     }
     return result;
   }
@@ -539,23 +534,6 @@ class Cutter {
     return detail::volumeShare(work.cells, mixed, at * kBrick);
   }
 
-  /// The same of a piece whose level set is written.
-  double volumeOf(const PieceLevel::Table& table, const float* samples, const Vec3i& at, std::uint32_t owner,
-                  BrickCells& cells) const {
-    std::array<BrickMask, 8> own;
-    for (std::size_t i = 0; i < 8; ++i) own[i] = ownedBy(owner, brickAt(at + stepOf(i)));
-    cells.setInside(own);
-    const BrickMask mixed = cells.mixed();
-    if (mixed.isEmpty()) return 0;
-    for (std::size_t i = 0; i < 8; ++i) {
-      const std::int32_t entry = table.entryAt(at + stepOf(i));
-      cells.samples[i] = entry == PieceLevel::kOutside  ? lowest_.data()
-                         : entry == PieceLevel::kInside ? highest_.data()
-                                                        : samples + std::size_t(entry - 2) * kSamples;
-    }
-    return detail::volumeShare(cells, mixed, at * kBrick);
-  }
-
   /// Some of its samples, each at its place.
   void evaluateSome(const BrickView& view, std::span<const std::uint16_t> samples, float* values) const {
     if (view.kind != BrickView::Kind::mixed) {
@@ -613,9 +591,8 @@ class Cutter {
     return beyond;
   }
 
-  /// The level sets of all owners; adds to their volumes, voxels cubed.
-  std::vector<PieceLevel> writeLevels(std::vector<double>& volumes) const {
-    const std::size_t count = volumes.size();
+  /// The level sets of the first owners.
+  std::vector<PieceLevel> writeLevels(std::size_t count) const {
     // Boxes first, then places for samples, as they are needed.
     std::vector<PieceLevel::Table> tables(count);
     std::vector<Vec3i> last(count);
@@ -660,26 +637,9 @@ class Cutter {
             }
         },
         progress_);
-    addVolumes(tables, samples->data(), volumes);
     std::vector<PieceLevel> levels;
     for (PieceLevel::Table& table : tables) levels.emplace_back(h_, band_, std::move(table), samples);
     return levels;
-  }
-
-  void addVolumes(const std::vector<PieceLevel::Table>& tables, const float* samples,
-                  std::vector<double>& volumes) const {
-    std::vector<double> shares(near_.items.size());
-    parallelFor(cut_.count(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
-      BrickCells cells;
-      for (std::size_t i = begin; i < end; ++i)
-        for (std::size_t n = near_.first[i]; n < near_.first[i + 1]; ++n)
-          if (const Near& near = near_.items[n]; near.isSurface)
-            shares[n] = volumeOf(tables[near.owner], samples, brick(i).brick, near.owner, cells);
-    });
-    for (std::size_t n = 0; n < shares.size(); ++n) volumes[near_.items[n].owner] += shares[n];
-    BrickCells cells;
-    for (const auto& [at, owner] : surfacesBeyond())
-      volumes[owner] += volumeOf(tables[owner], samples, at, owner, cells);
   }
 
   const ScalarField& shape_;
@@ -687,8 +647,6 @@ class Cutter {
   const Progress& progress_;
   float h_, band_, halfKerf_;
 
-  /// Bricks at the ends of the band.
-  std::array<float, kSamples> lowest_, highest_;
   detail::CutBricks cut_;
   Vec3i firstBrick_{}, brickCount_{};
   std::vector<std::int32_t> brickAt_;

@@ -35,8 +35,6 @@ struct Piece {
   /// min(shape, +-knives - kerf / 2, distance to the cell's sides) within the band of its surface, the band's
   /// ends beyond; positive inside. Other pieces of the same code are outside of it.
   PieceLevel level;
-  /// Of its marching cubes mesh, world units cubed.
-  double volume = 0.0;
 };
 
 struct Pieces {

@@ -163,13 +163,13 @@ void corefinedCells(benchmark::State& state) {
 }
 
 /// Splitting in turn with making the level set: from the level set and the knives to all pieces' level sets
-/// as fields, one of whose values each is read, and their volumes.
+/// as fields, one of whose values each is read; and once more with the volume of each.
 void splitAgainstLevelSet(benchmark::State& state) {
   CutOptions all = options();
   for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
   level();
   const Vec3f middle = box().center();
-  std::vector<double> ratios, processorRatios;
+  std::vector<double> ratios, processorRatios, withVolumes;
   std::size_t bytes = 0, count = 0;
   for (auto _ : state) {
     // Of all processors together, which other programs do not change much.
@@ -183,6 +183,10 @@ void splitAgainstLevelSet(benchmark::State& state) {
       for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level.field()(middle));
     });
     processorRatios.push_back(double(std::clock() - between) / double(between - start));
+    const double measured = secondsOf([&] {
+      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level.volume());
+    });
+    withVolumes.push_back((split + measured) / made);
     bytes = 0, count = cut.pieces.size();
     for (const Piece& piece : cut.pieces) bytes += piece.level.memoryBytes();
     state.SetIterationTime(split);
@@ -190,11 +194,13 @@ void splitAgainstLevelSet(benchmark::State& state) {
   }
   std::sort(ratios.begin(), ratios.end());
   std::sort(processorRatios.begin(), processorRatios.end());
+  std::sort(withVolumes.begin(), withVolumes.end());
   state.SetLabel(fmt::format(
-      "{:.2f} times the level set ({:.2f} to {:.2f}), {:.2f} times its processor time ({:.2f} to {:.2f}), {} "
-      "pieces as fields, {:.0f} MB",
+      "{:.2f} times the level set ({:.2f} to {:.2f}), {:.2f} times its processor time ({:.2f} to {:.2f}), "
+      "{:.2f} times with volumes, {} pieces as fields, {:.0f} MB",
       ratios[ratios.size() / 2], ratios.front(), ratios.back(), processorRatios[processorRatios.size() / 2],
-      processorRatios.front(), processorRatios.back(), count, double(bytes) / 1e6));
+      processorRatios.front(), processorRatios.back(), withVolumes[withVolumes.size() / 2], count,
+      double(bytes) / 1e6));
 }
 
 /// A level set by linear cells, in turn with its marching cubes mesh, cut as a mesh.

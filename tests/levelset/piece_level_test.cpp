@@ -90,7 +90,7 @@ TEST(PieceVolumes, AreThoseOfTheMarchingCubesMeshes) {
     ASSERT_FALSE(cut.pieces.empty());
     for (const Piece& piece : cut.pieces) {
       const double volume = signedVolume(marchingCubes(*piece.level.toBricks()));
-      EXPECT_NEAR(piece.volume / volume, 1, 1e-10);
+      EXPECT_NEAR(piece.level.volume() / volume, 1, 1e-10);
     }
   };
   check(ballInPieces(9, 0.04f));
@@ -107,7 +107,8 @@ TEST(PieceVolumes, OfAShapeThatItsBoxCutsOffAreThoseOfTheMeshes) {
     CutOptions options{.voxelSize = 0.07f, .box = Box{half.min + Vec3f{shift, shift, 0}, half.max}};
     options.knives = {flatKnife({{0.3f, 0, 0}, {1, 0.2f, 0.1f}})};
     for (const Piece& piece : cutIntoPieces(sphere({0, 0, 0}, 1), options).pieces)
-      EXPECT_NEAR(piece.volume / signedVolume(marchingCubes(*piece.level.toBricks())), 1, 1e-10) << shift;
+      EXPECT_NEAR(piece.level.volume() / signedVolume(marchingCubes(*piece.level.toBricks())), 1, 1e-10)
+          << shift;
   }
 }
 

@@ -123,7 +123,7 @@ TEST_P(BladesThroughTheCentre, PartABallIntoTheKnownNumberOfPieces) {
   // per radius; rims grow with the number of planes and of their lines.
   const double whole = meshVolume(cutIntoPieces(ball(), {.voxelSize = 0.01f, .box = kBall}));
   double sum = 0;
-  for (const Piece& piece : cut.pieces) sum += piece.volume;
+  for (const Piece& piece : cut.pieces) sum += piece.level.volume();
   if (count <= 5) {
     EXPECT_NEAR(sum / whole, 1, count == 1 ? 1e-4 : 1e-3);
   }
@@ -143,9 +143,9 @@ TEST(Pieces, OfOnePlaneAreTheCapsOfTheBall) {
   const double cap = M_PI * height * height * (3 - height) / 3;
   for (const Piece& piece : cut.pieces) {
     const double expected = piece.code.sides[0] ? cap : kBallVolume - cap;
-    EXPECT_NEAR(piece.volume / expected, 1, 1e-3);
+    EXPECT_NEAR(piece.level.volume() / expected, 1, 1e-3);
     // The same triangles, summed in another order.
-    EXPECT_NEAR(piece.volume / meshVolume(piece), 1, 1e-12);
+    EXPECT_NEAR(piece.level.volume() / meshVolume(piece), 1, 1e-12);
   }
 }
 
@@ -308,7 +308,7 @@ TEST(Pieces, AreClosedAndManifold) {
     const MeshDiagnosis diagnosis = diagnose(mesh);
     EXPECT_TRUE(diagnosis.manifold());
     EXPECT_GT(diagnosis.volume, 0.04 * 0.04 * 0.04);
-    EXPECT_NEAR(diagnosis.volume, piece.volume, 1e-9);
+    EXPECT_NEAR(diagnosis.volume, piece.level.volume(), 1e-9);
   }
 }
 
@@ -334,7 +334,7 @@ TEST(Pieces, OfOneCodeThatAreApartAreSeparate) {
                                            .knives = {flatKnife({{0, 0.02f, 0}, {0, 1, 0}})}});
   ASSERT_EQ(cut.pieces.size(), 4u);
   EXPECT_EQ(cut.codes, 2u);
-  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.volume / (kBallVolume / 2), 1, 0.04);
+  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.level.volume() / (kBallVolume / 2), 1, 0.04);
 }
 
 TEST(Pieces, OfVoronoiCellsEqualTheirFieldAndFillTheShape) {
@@ -359,7 +359,7 @@ TEST(Pieces, OfVoronoiCellsEqualTheirFieldAndFillTheShape) {
           else
             ASSERT_NEAR(v, expected, 1e-6f);
         }
-    volume += piece.volume;
+    volume += piece.level.volume();
   }
   EXPECT_LE(dropped, 2 * cut.slivers);
   // 25 voxels per radius, some 30 rims: as for 5 planes, 16 times what 100 voxels allow.
@@ -367,7 +367,8 @@ TEST(Pieces, OfVoronoiCellsEqualTheirFieldAndFillTheShape) {
   const Pieces apart =
       cutIntoPieces(ball(), {.voxelSize = kVoxel, .box = kBall, .cells = points, .kerf = 0.08f});
   EXPECT_EQ(apart.pieces.size(), 12u);
-  for (std::size_t i = 0; i < 12; ++i) EXPECT_LT(apart.pieces[i].volume, cut.pieces[i].volume);
+  for (std::size_t i = 0; i < 12; ++i)
+    EXPECT_LT(apart.pieces[i].level.volume(), cut.pieces[i].level.volume());
 }
 
 TEST(Pieces, OfVoronoiCellsAreCutByKnivesToo) {
@@ -376,7 +377,7 @@ TEST(Pieces, OfVoronoiCellsAreCutByKnivesToo) {
       ball(),
       {.voxelSize = 0.05f, .box = kBall, .knives = {flatKnife({{0, 0.01f, 0}, {0, 1, 0}})}, .cells = points});
   ASSERT_EQ(cut.pieces.size(), 4u);
-  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.volume / (kBallVolume / 4), 1, 0.05);
+  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.level.volume() / (kBallVolume / 4), 1, 0.05);
 }
 
 TEST(Pieces, AKnifeThatMissesLeavesOne) {
@@ -443,7 +444,7 @@ TEST(Pieces, OfSeventyKnivesAreSlices) {
   const Box bar{{-3.55f, -0.1f, -0.1f}, {3.55f, 0.1f, 0.1f}};
   const Pieces cut = cutIntoPieces(box(bar), {.voxelSize = 0.0125f, .box = bar, .knives = flat(blades)});
   ASSERT_EQ(cut.pieces.size(), 71u);
-  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.volume, 0.1 * 0.2 * 0.2, 2e-4);
+  for (const Piece& piece : cut.pieces) EXPECT_NEAR(piece.level.volume(), 0.1 * 0.2 * 0.2, 2e-4);
 }
 
 TEST(Pieces, OfTheBunnyKeepItsVoxels) {
