@@ -12,6 +12,8 @@
 // sample, if the surface about it is a disc and stays one: positive samples around it hang together, the
 // others do, and no edge or triangle of samples of 0 has more surface at it than two faces.
 //
+// Vertices of blades are then moved along their edges onto the blade itself, where nothing else is near.
+//
 // Limit: blades are as coarse as the lattice; waves below two voxels are lost.
 #include "levelset/lattice_carve.h"
 
@@ -24,6 +26,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <utility>
 
 #include "levelset/solid_split.h"
 #include "levelset/tetrahedron_facets.h"
@@ -260,7 +263,7 @@ class BrickCarver {
     if (!brick_->undecided.empty()) placeSamples();
     std::size_t next = 1;
     for (const std::uint32_t k : brick_->undecided) {
-      evaluateKnife(k);
+      evaluateKnife(k, samples_);
       for (std::uint32_t side = 0; side < carving_.functionsPerKnife(); ++side, ++next) {
         functions_[next].id = carving_.functionOf(k) + side;
         const double offset = side == 0 ? carving_.halfKerf : -carving_.halfKerf;
@@ -281,18 +284,19 @@ class BrickCarver {
         }
   }
 
-  void evaluateKnife(std::uint32_t k) {
+  /// At `points_`.
+  void evaluateKnife(std::uint32_t k, std::span<float> values) {
     const Knife& knife = carving_.knives[k].knife;
     const PointSpans points{points_[0], points_[1], points_[2]};
     if (!(carving_.halfKerf > 0 && knife.steepest > 1)) {
-      knife.field.eval(points, std::span<float>(samples_));
+      knife.field.eval(points, values);
       return;
     }
-    for (auto& lane : slopes_) lane.resize(kRingSamples);
-    knife.field.evalGrad(points, std::span<float>(samples_), {{slopes_[0], slopes_[1], slopes_[2]}});
-    for (std::size_t i = 0; i < kRingSamples; ++i) {
+    for (auto& lane : slopes_) lane.resize(values.size());
+    knife.field.evalGrad(points, values, {{slopes_[0], slopes_[1], slopes_[2]}});
+    for (std::size_t i = 0; i < values.size(); ++i) {
       const float slope = length(Vec3f{slopes_[0][i], slopes_[1][i], slopes_[2][i]});
-      if (slope > 0) samples_[i] /= slope;
+      if (slope > 0) values[i] /= slope;
     }
   }
 
@@ -411,8 +415,8 @@ class BrickCarver {
     }
     if (ring_.size() > 1 && ring_.front() == ring_.back()) ring_.pop_back();
     if (ring_.size() < 3) return;
-    if (isOdd != (determinant(carving_.level.indexToWorld.linear) < 0))
-      std::reverse(ring_.begin(), ring_.end());
+    const bool isMirrored = isOdd != (determinant(carving_.level.indexToWorld.linear) < 0);
+    if (isMirrored) std::reverse(ring_.begin(), ring_.end());
     places_.clear();
     for (const Key& key : ring_) places_.push_back(placeOf(key));
     const std::uint32_t parent = function == 0 ? 0 : kOnPlane | frameOf(function);
@@ -422,6 +426,21 @@ class BrickCarver {
       if (below >= 0)
         brick_->triangles.push_back({{ring_[a], ring_[c], ring_[b]}, parent, std::uint32_t(below)});
     };
+    const auto cutOff = [&](std::size_t ear) {
+      const std::size_t count = ring_.size();
+      add((ear + count - 1) % count, ear, (ear + 1) % count);
+      ring_.erase(ring_.begin() + std::ptrdiff_t(ear));
+      places_.erase(places_.begin() + std::ptrdiff_t(ear));
+    };
+    // The same for both sides of a kerf, see moveOntoBlade.
+    if (carving_.functionsPerKnife() == 2 && function != 0 && ring_.size() == 4 &&
+        facet.corners.size() == 4) {
+      constexpr std::uint8_t kDiagonal = 0b1001;
+      const auto corner = std::find_if(facet.corners.begin(), facet.corners.end(),
+                                       [](const FacetCorner& c) { return c.carrier == kDiagonal; });
+      const auto place = std::size_t(corner - facet.corners.begin()) % 4;
+      cutOff(isMirrored ? 3 - place : place);
+    }
     // Ears with the shortest cuts first.
     while (ring_.size() > 3) {
       const std::size_t count = ring_.size();
@@ -431,9 +450,7 @@ class BrickCarver {
         const Vec3d cut = places_[(i + 1) % count] - places_[(i + count - 1) % count];
         if (const double squared = dot(cut, cut); squared < least) least = squared, ear = i;
       }
-      add((ear + count - 1) % count, ear, (ear + 1) % count);
-      ring_.erase(ring_.begin() + std::ptrdiff_t(ear));
-      places_.erase(places_.begin() + std::ptrdiff_t(ear));
+      cutOff(ear);
     }
     add(0, 1, 2);
   }
@@ -547,8 +564,124 @@ class BrickCarver {
       if (!key.isOwn()) break;
       brick_->positions.push_back(carving_.world(placeOf(key) + Vec3d(brick_->at * kBrick)));
     }
+    for (std::size_t u = 0; u < brick_->undecided.size(); ++u) moveOntoBlade(u);
     brick_->undecided = {};
     brick_->isPositive = {};
+  }
+
+  /// Where a blade crosses an edge, from 0 at its start to 1 at its end, and what is known of the way there.
+  struct Crossing {
+    std::size_t vertex;
+    Vec3d start, along;
+    double offset;
+    double low, atLow, high, atHigh, place, linear;
+    /// Which end the last step moved: -1, 1, or 0 before the first.
+    int moved = 0;
+    bool isDone = false;
+  };
+
+  /// Along an edge a curved blade is not linear. Moves the vertices of one that are far from other surfaces:
+  /// in all tetrahedra about their edge there is one sheet of this blade alone, or the two sides of its
+  /// kerf. These stay apart, since they keep their order on all edges and have the same diagonals.
+  void moveOntoBlade(std::size_t undecided) {
+    crossings_.clear();
+    const std::uint32_t knife = brick_->undecided[undecided], per = carving_.functionsPerKnife();
+    const std::size_t first = 1 + undecided * per;
+    for (std::size_t v = 0; v < brick_->positions.size(); ++v)
+      for (std::size_t f = first; f < first + per; ++f)
+        if (const Key& key = brick_->keys[v];
+            key.functionCount() == 1 && key.function(0) == functions_[f].id && isFarFromOthers(key, first))
+          addCrossing(v, f, f == first ? carving_.halfKerf : -carving_.halfKerf);
+    constexpr int kMostSteps = 32;
+    for (int step = 0; step < kMostSteps; ++step) {
+      for (auto& lane : points_) lane.clear();
+      for (const Crossing& c : crossings_) {
+        if (c.isDone) continue;
+        const Vec3f p(carving_.world(c.start + c.along * c.place));
+        for (int axis = 0; axis < 3; ++axis) points_[std::size_t(axis)].push_back(p[axis]);
+      }
+      if (points_[0].empty()) break;
+      residuals_.resize(points_[0].size());
+      evaluateKnife(knife, residuals_);
+      auto residual = residuals_.begin();
+      for (Crossing& c : crossings_)
+        if (!c.isDone) closeIn(c, double(*residual++) - c.offset);
+    }
+    for (std::size_t i = 0, next; i < crossings_.size(); i = next) {
+      const Crossing& c = crossings_[i];
+      next = i + 1;
+      const bool isPair =
+          next < crossings_.size() && crossings_[next].start == c.start && crossings_[next].along == c.along;
+      if (isPair) {
+        const Crossing& other = crossings_[next++];
+        if ((c.place < other.place) != (c.linear < other.linear) || c.place == other.place) continue;
+      }
+      for (std::size_t j = i; j < next; ++j)
+        brick_->positions[crossings_[j].vertex] =
+            carving_.world(crossings_[j].start + crossings_[j].along * crossings_[j].place);
+    }
+  }
+
+  /// Whether all other functions have one sign on the tetrahedra about an edge.
+  bool isFarFromOthers(const Key& key, std::size_t first) const {
+    const Vec3i base = key.base();
+    const int r = ringIndex(base.x, base.y, base.z);
+    const std::size_t edge = key.first() - 1;
+    const unsigned around = neighboursOfNeighbours()[edge] | 1u << edge;
+    for (std::size_t g = 0; g < rings_.size(); ++g) {
+      if (g >= first && g < first + carving_.functionsPerKnife()) continue;
+      const bool isPositive = rings_[g][std::size_t(r)] > 0;
+      for (std::size_t n = 0; n < kNeighbours.size(); ++n)
+        if ((around >> n & 1) != 0 && (rings_[g][std::size_t(r + kNeighbours[n])] > 0) != isPositive)
+          return false;
+    }
+    return true;
+  }
+
+  void addCrossing(std::size_t vertex, std::size_t f, double offset) {
+    const Key& key = brick_->keys[vertex];
+    const Vec3i base = key.base(), end = base + cornerOffset(key.first());
+    const Function& function = functions_[f];
+    if (isVertexAt(function, base) || isVertexAt(function, end)) return;
+    const double unit =
+        carving_.reach((function.id - 1) / carving_.functionsPerKnife()) / double(kLargestValue);
+    const double low = unit * function.values[std::size_t(indexOf(base))],
+                 high = unit * function.values[std::size_t(indexOf(end))];
+    // Vertices at the ends stay there.
+    const double place = low / (low - high);
+    if (place < kMargin || place > 1 - kMargin) return;
+    crossings_.push_back({.vertex = vertex,
+                          .start = Vec3d(base + brick_->at * kBrick),
+                          .along = Vec3d(cornerOffset(key.first())),
+                          .offset = offset,
+                          .low = 0,
+                          .atLow = low,
+                          .high = 1,
+                          .atHigh = high,
+                          .place = place,
+                          .linear = place});
+  }
+
+  /// A step of the Illinois method.
+  static void closeIn(Crossing& c, double residual) {
+    constexpr double kNear = 1.0 / 65536;
+    if (std::isnan(residual)) {
+      c.place = c.linear;
+      c.isDone = true;
+      return;
+    }
+    const int end = (residual > 0) == (c.atLow > 0) ? -1 : 1;
+    const bool isSame = std::exchange(c.moved, end) == end;
+    if (end < 0) {
+      c.low = c.place, c.atLow = residual;
+      if (isSame) c.atHigh /= 2;
+    } else {
+      c.high = c.place, c.atHigh = residual;
+      if (isSame) c.atLow /= 2;
+    }
+    const double next = c.low + (c.high - c.low) * c.atLow / (c.atLow - c.atHigh);
+    const double before = std::exchange(c.place, std::clamp(next, kMargin, 1 - kMargin));
+    c.isDone = residual == 0 || std::abs(c.place - before) < kNear;
   }
 
   const Carving& carving_;
@@ -564,6 +697,8 @@ class BrickCarver {
   std::vector<CornerValues> values_;
   std::vector<Key> keys_, ring_;
   std::vector<Vec3d> places_;
+  std::vector<Crossing> crossings_;
+  std::vector<float> residuals_;
   std::string signs_;
   std::map<std::string, std::int32_t> codes_;
 };

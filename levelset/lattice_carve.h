@@ -18,7 +18,8 @@ struct LatticeKnife {
 };
 
 /// Parts the inside of a level set (> 0) by knives on its own lattice: every cell is six tetrahedra, in which
-/// the level set and the knives are linear. With a kerf, what is between the two sides of a knife belongs to
+/// the level set and the knives are linear, but that vertices of a knife with nothing else near lie on the
+/// knife itself. With a kerf, what is between the two sides of a knife belongs to
 /// nobody.
 ///
 /// Every part is a closed manifold, whatever the samples: all decisions are exact (`TetrahedronFacets`).

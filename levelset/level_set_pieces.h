@@ -42,12 +42,13 @@ struct LevelSetCutOptions {
 /// `uv` of a knife that is no plane is the place on the axis plane that the face looks at most.
 ///
 /// Planes and cells, which are linear everywhere, cut whole triangles, and their faces are as large as can
-/// be; other knives have the triangles of the lattice. These lie off a blade of radius r by at most
-/// 3 / 8 voxel^2 / r. Decisions are exact (`TetrahedronFacets` in the sources): knives may meet anywhere, in
-/// samples, or coincide with the surface, and any level set does. Equal fields, or equal rough blades, cut
-/// once. The order of the knives changes nothing but the order of the signs in the codes: pieces come in the
-/// same order, with the same bits. The same result at any number of threads. Cost: as `cutMesh` for planes
-/// and cells; for other knives the cells inside the level set that they pass.
+/// be; other knives have the triangles of the lattice. Their vertices lie on the blade within a thousandth of
+/// a voxel; beside rims and other knives, where they are those of linear cells, they are off a blade of
+/// radius r by at most 3 / 8 voxel^2 / r. Decisions are exact (`TetrahedronFacets` in the sources): knives
+/// may meet anywhere, in samples, or coincide with the surface, and any level set does. Equal fields, or
+/// equal rough blades, cut once. The order of the knives changes nothing but the order of the signs in the
+/// codes: pieces come in the same order, with the same bits. The same result at any number of threads. Cost:
+/// as `cutMesh` for planes and cells; for other knives the cells inside the level set that they pass.
 /// @throws Error if the level set has no surface or its background is inside, values are not finite, a
 /// normal is 0, cells are equal, minVolume or kerf < 0, or there are more than 16 000 knives; as `roughKnife`
 /// for rough blades; Cancelled.

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "levelset/brick_mask.h"
+#include "levelset/grid_field.h"
 #include "levelset/marching_cubes.h"
 #include "levelset/mesh_io.h"
 #include "levelset/mesh_repair.h"
@@ -390,6 +391,24 @@ TEST(Pieces, AKnifeThatMissesLeavesOne) {
   const Pieces whole = cutIntoPieces(ball(), {.voxelSize = 0.05f, .box = kBall});
   ASSERT_EQ(whole.pieces.size(), 1u);
   EXPECT_TRUE(sameGrid(*whole.pieces[0].level.toBricks(), *cut.pieces[0].level.toBricks()));
+}
+
+TEST(Pieces, OfAGridHaveItsSamplesBitForBitIfTheirVoxelsAreItsOwn) {
+  // 0.1 is no binary number: positions and interpolation would lose bits.
+  const float h = 0.1f, band = 3 * h;
+  const auto grid = bakeGrid(ball(), {.voxelSize = h, .box = kBall, .band = {-band, band}});
+  const Pieces cut = cutIntoPieces(gridField(grid), {.voxelSize = h, .box = kBall});
+  ASSERT_EQ(cut.pieces.size(), 1u);
+  int compared = 0;
+  for (int z = -12; z <= 12; ++z)
+    for (int y = -12; y <= 12; ++y)
+      for (int x = -12; x <= 12; ++x) {
+        const float sample = grid->at({x, y, z});
+        if (std::abs(sample) >= band) continue;
+        ASSERT_EQ(cut.pieces[0].level.at({x, y, z}), sample) << x << " " << y << " " << z;
+        ++compared;
+      }
+  EXPECT_GT(compared, 4000);
 }
 
 TEST(Pieces, CoincidentKnivesCutOnce) {
