@@ -118,16 +118,17 @@ CutSource::Weights CutSource::weightsAt(std::uint32_t triangle, const Vec3d& p) 
   return {1 - wb - wc, wb, wc};
 }
 
-Mesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell, std::size_t& firstInside) const {
+ShellMesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell) const {
   std::vector<std::uint32_t> order(shell.triangles.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return groupOf(shell.triangles[a].face) < groupOf(shell.triangles[b].face);
   });
-  Mesh mesh;
+  ShellMesh result;
+  Mesh& mesh = result.mesh;
   mesh.positions.reserve(shell.vertices.size());
   for (const std::uint32_t v : shell.vertices) mesh.positions.push_back(splitter.position(v));
-  firstInside = order.size();
+  result.firstInside = order.size();
   std::uint32_t group = 0;
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     const std::uint32_t here = groupOf(shell.triangles[order[i]].face);
@@ -137,7 +138,7 @@ Mesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell, std::s
         mesh.groups.push_back({"inside", i, 0});
       else
         mesh.groups.push_back({mesh_.groups[here - 1].name, i, 0, mesh_.groups[here - 1].material});
-      if (isInside) firstInside = i;
+      if (isInside) result.firstInside = i;
       group = here;
     }
     if (group != 0) ++mesh.groups.back().faceCount;
@@ -146,7 +147,13 @@ Mesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell, std::s
   for (const MeshAttribute& attribute : mesh_.attributes)
     addAttribute(attribute, splitter, shell, order, mesh);
   if (!hasUv(mesh_)) addAttribute({"uv", MeshAttribute::Domain::corner, 2, {}}, splitter, shell, order, mesh);
-  return mesh;
+  if (shell.crowded.empty()) return result;
+  std::vector<std::uint32_t> placeOf(order.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) placeOf[order[i]] = i;
+  const auto cornerOf = [&](std::uint32_t c) { return 3 * placeOf[c / 3] + c % 3; };
+  for (const CornerPair& pair : shell.crowded)
+    result.crowded.push_back({cornerOf(pair[0]), cornerOf(pair[1])});
+  return result;
 }
 
 void CutSource::addAttribute(const MeshAttribute& attribute, const SolidSplitter& splitter,

@@ -15,6 +15,14 @@ struct Carved;
 /// Edges that do not have as many faces one way as the other.
 std::size_t openEdges(const std::vector<TriangleIndices>& triangles);
 
+struct ShellMesh {
+  Mesh mesh;
+  /// The first face that a knife made.
+  std::size_t firstInside = 0;
+  /// As `Shell::crowded`, for the corners of the mesh.
+  std::vector<CornerPair> crowded{};
+};
+
 /// A closed mesh that is to be cut, and what its pieces take over from it.
 class CutSource {
  public:
@@ -33,8 +41,8 @@ class CutSource {
   /// How near to a plane a point is on it: 1e-11 of the size, and above rounding.
   double tolerance() const { return tolerance_; }
 
-  /// A shell as a mesh, with attributes and groups. `firstInside` is its first face made by a plane.
-  Mesh meshOf(const SolidSplitter& splitter, const Shell& shell, std::size_t& firstInside) const;
+  /// A shell as a mesh, with attributes and groups.
+  ShellMesh meshOf(const SolidSplitter& splitter, const Shell& shell) const;
 
  private:
   using Weights = std::array<double, 3>;

@@ -252,8 +252,8 @@ Assembly assemble(const CutSource& source, const SolidSplitter& splitter, Part& 
       continue;
     }
     MeshPiece piece;
-    std::size_t firstInside = 0;
-    piece.mesh = source.meshOf(splitter, shell, firstInside);
+    detail::ShellMesh shellMesh = source.meshOf(splitter, shell);
+    piece.mesh = std::move(shellMesh.mesh);
     piece.code = part.code;
     piece.mass = massProperties(piece.mesh);
     piece.boxMin = piece.boxMax = piece.mesh.positions[0];
@@ -262,12 +262,14 @@ Assembly assemble(const CutSource& source, const SolidSplitter& splitter, Part& 
       piece.boxMax = max(piece.boxMax, p);
     }
     std::vector<InnerTriangle> inner;
-    for (std::size_t f = firstInside; f < piece.mesh.faceCount(); ++f) {
+    for (std::size_t f = shellMesh.firstInside; f < piece.mesh.faceCount(); ++f) {
       const auto v = piece.mesh.face(f);
       const Vec3d &a = piece.mesh.positions[v[0]], &b = piece.mesh.positions[v[1]],
                   &c = piece.mesh.positions[v[2]];
       inner.push_back({placeOf({a, b, c}), 0, length(cross(b - a, c - a)) / 2});
     }
+    // Last, so that both sides of a cut are compared with the same triangles.
+    detail::splitEdges(piece.mesh, shellMesh.crowded);
     result.pieces.push_back(std::move(piece));
     result.inner.push_back(std::move(inner));
   }

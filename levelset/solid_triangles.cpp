@@ -283,6 +283,7 @@ std::vector<Shell> shellsOf(const SolidSplitter& splitter, const std::vector<Sol
   std::vector<Shell> shells;
   constexpr std::uint32_t kNone = ~0u;
   std::vector<std::uint32_t> shellOf(triangles.size(), kNone), numberOf(halves.size(), kNone);
+  std::vector<std::uint32_t> place(triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const std::uint32_t root = parts.root(t);
     if (shellOf[root] == kNone) {
@@ -290,6 +291,7 @@ std::vector<Shell> shellsOf(const SolidSplitter& splitter, const std::vector<Sol
       shells.emplace_back();
     }
     Shell& shell = shells[shellOf[root]];
+    place[t] = std::uint32_t(shell.triangles.size());
     shell.triangles.push_back(triangles[t]);
     for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) {
       const std::uint32_t fan = fans.root(c);
@@ -298,6 +300,21 @@ std::vector<Shell> shellsOf(const SolidSplitter& splitter, const std::vector<Sol
         shell.vertices.push_back(vertex(c));
       }
       shell.corners.push_back(numberOf[fan]);
+    }
+  }
+  for (std::size_t i = 0, end = 0; i < halves.size(); i = end) {
+    std::size_t middle = i;
+    std::vector<CornerPair> ends;
+    for (end = i; end < halves.size() && halves[end].key == halves[i].key; ++end)
+      middle += halves[end].isForward ? 1 : 0;
+    if (end - i <= 2) continue;
+    for (std::size_t k = 0; k < std::min(middle - i, end - middle); ++k) {
+      const std::uint32_t a = halves[i + k].corner, b = halves[middle + k].corner;
+      const CornerPair fansAtEnds{fans.root(a), fans.root(nextCorner(a))};
+      const bool isCrowded = std::find(ends.begin(), ends.end(), fansAtEnds) != ends.end();
+      ends.push_back(fansAtEnds);
+      const auto cornerOf = [&](std::uint32_t c) { return 3 * place[c / 3] + c % 3; };
+      if (isCrowded) shells[shellOf[parts.root(a / 3)]].crowded.push_back({cornerOf(a), cornerOf(b)});
     }
   }
   for (Shell& shell : shells) {
@@ -318,6 +335,9 @@ std::vector<Shell> shellsOf(const SolidSplitter& splitter, const std::vector<Sol
         around = &shell;
     if (!around) continue;
     const auto offset = std::uint32_t(around->vertices.size());
+    const auto cornerOffset = std::uint32_t(around->corners.size());
+    for (const CornerPair& pair : cavity.crowded)
+      around->crowded.push_back({cornerOffset + pair[0], cornerOffset + pair[1]});
     around->triangles.insert(around->triangles.end(), cavity.triangles.begin(), cavity.triangles.end());
     around->vertices.insert(around->vertices.end(), cavity.vertices.begin(), cavity.vertices.end());
     for (const std::uint32_t c : cavity.corners) around->corners.push_back(offset + c);

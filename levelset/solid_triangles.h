@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "levelset/crowded_edges.h"
 #include "levelset/solid_split.h"
 
 namespace nephele::detail {
@@ -23,6 +24,9 @@ struct Shell {
   std::vector<std::uint32_t> corners;
   /// Per such number: the vertex of the solid.
   std::vector<std::uint32_t> vertices;
+  /// Edges between two such vertices that have more than two faces: all pairs of faces but the first, by
+  /// `corners`.
+  std::vector<CornerPair> crowded;
   double volume = 0.0;
 };
 

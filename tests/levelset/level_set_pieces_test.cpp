@@ -434,7 +434,7 @@ TEST(LevelSetPieces, AreSoundOnAnySamplesByAnyFields) {
 }
 
 TEST(LevelSetPieces, AreSoundOnAnySamplesByPlanes) {
-  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+  for (std::uint32_t seed = 0; seed < 120; ++seed) {
     const auto level = randomLattice(seed, 3 + int(seed / 4 % 4));
     const Mesh whole = marchingTetrahedra(*level);
     if (whole.faceCount() == 0) continue;
@@ -447,10 +447,11 @@ TEST(LevelSetPieces, AreSoundOnAnySamplesByPlanes) {
       ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
     }
     ASSERT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 1e-10) << seed;
-    // Together with fields, whose faces may lie in the plane, edges may have four faces; none is open.
+    // Together with fields, whose faces may lie in the plane, surfaces may touch themselves along edges.
     options.knives.push_back(gridField(randomLattice(seed + 1, 5)));
     for (const MeshPiece& piece : cutLevelSet(*level, options).pieces)
-      ASSERT_EQ(topologyOf(piece.mesh).openEdges, 0u) << seed;
+      ASSERT_TRUE(topologyOf(piece.mesh).isClosedManifold())
+          << "seed " << seed << ": " << topologyOf(piece.mesh);
   }
 }
 
