@@ -55,13 +55,17 @@ nlohmann::json layersOf(const Cloud& cloud, const CloudOptions& options, const C
 }
 
 void growCloud(const CloudArguments& arguments, Run& run) {
+  run.expect(0, 0.02);
   const Mesh shape = arguments.shape.shape(run);
   FieldSources sources = arguments.sources(shape, run);
   const CloudOptions options = arguments.resolved(sources);
   tellLayers(arguments, options, sources.box(), run);
   run.requireMemory(estimatedCloudBytes(shape, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
+  // Distance, layers, density and perhaps the surface.
+  run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
   Cloud cloud = makeCloud(shape, options, run);
+  run.expect(0.9, 1, 2);
   cloud.density = arguments.advection.carried(cloud.density, sources, arguments.seed, run);
   run.stats["layers"] = layersOf(cloud, options, arguments, sources.box());
 
