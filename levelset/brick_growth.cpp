@@ -49,31 +49,27 @@ BrickPoints::BrickPoints(const Lattice& lattice, const Vec3i& brick) {
 }
 
 void BrickNumbers::set(const Vec3i& brick, std::int32_t number) {
-  const Vec3i p = brick - first_;
-  if (p.x < 0 || p.y < 0 || p.z < 0 || p.x >= count_.x || p.y >= count_.y || p.z >= count_.z) {
-    const Vec3i margin{kGrowth, kGrowth, kGrowth};
+  if (!bricks_.covers(brick)) {
+    const Vec3i margin{kGrowth, kGrowth, kGrowth}, one{1, 1, 1};
+    const BrickBox old = bricks_;
     const bool isEmpty = numbers_.empty();
-    const Vec3i first = isEmpty ? brick - margin : min(first_, brick - margin);
-    const Vec3i last = isEmpty ? brick + margin : max(first_ + count_ - Vec3i{1, 1, 1}, brick + margin);
-    const Vec3i count = last - first + Vec3i{1, 1, 1};
+    const Vec3i first = isEmpty ? brick - margin : min(old.first, brick - margin);
+    const Vec3i last = isEmpty ? brick + margin : max(old.first + old.count - one, brick + margin);
+    const Vec3i count = last - first + one;
     require(double(count.x) * count.y * count.z <= kLargestTable,
             fmt::format("advection: the result spreads over {} x {} x {} voxels, more than can be held",
                         8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
-    std::vector<std::int32_t> numbers(std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z), -1);
-    for (int z = 0; z < count_.z; ++z)
-      for (int y = 0; y < count_.y; ++y)
-        std::copy_n(
-            numbers_.begin() + (std::ptrdiff_t(z) * count_.y + y) * count_.x, count_.x,
-            numbers.begin() +
-                ((std::ptrdiff_t(z + first_.z - first.z) * count.y) + y + first_.y - first.y) * count.x +
-                (first_.x - first.x));
-    first_ = first;
-    count_ = count;
+    bricks_ = {first, count};
+    std::vector<std::int32_t> numbers(bricks_.size(), -1);
+    for (int z = 0; z < old.count.z; ++z)
+      for (int y = 0; y < old.count.y; ++y) {
+        const Vec3i row = old.first + Vec3i{0, y, z};
+        std::copy_n(numbers_.begin() + std::ptrdiff_t(old.numberOf(row)), old.count.x,
+                    numbers.begin() + std::ptrdiff_t(bricks_.numberOf(row)));
+      }
     numbers_ = std::move(numbers);
   }
-  const Vec3i q = brick - first_;
-  numbers_[(std::size_t(q.z) * std::size_t(count_.y) + std::size_t(q.y)) * std::size_t(count_.x) +
-           std::size_t(q.x)] = number;
+  numbers_[bricks_.numberOf(brick)] = number;
 }
 
 GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& options,

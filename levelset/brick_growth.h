@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "levelset/brick_box.h"
 #include "levelset/brick_grid.h"
 #include "levelset/lattice.h"
 #include "modeling/progress.h"
@@ -32,18 +33,15 @@ class BrickNumbers {
  public:
   /// The number of `brick`, or -1.
   std::int32_t at(const Vec3i& brick) const {
-    const Vec3i p = brick - first_;
-    if (p.x < 0 || p.y < 0 || p.z < 0 || p.x >= count_.x || p.y >= count_.y || p.z >= count_.z) return -1;
-    return numbers_[(std::size_t(p.z) * std::size_t(count_.y) + std::size_t(p.y)) * std::size_t(count_.x) +
-                    std::size_t(p.x)];
+    return bricks_.covers(brick) ? numbers_[bricks_.numberOf(brick)] : -1;
   }
   /// @throws Error if the box becomes too large to hold.
   void set(const Vec3i& brick, std::int32_t number);
-  const Vec3i& first() const { return first_; }
-  const Vec3i& count() const { return count_; }
+  const Vec3i& first() const { return bricks_.first; }
+  const Vec3i& count() const { return bricks_.count; }
 
  private:
-  Vec3i first_{}, count_{};
+  BrickBox bricks_;
   std::vector<std::int32_t> numbers_;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "levelset/brick_box.h"
 #include "levelset/brick_grid.h"
 
 namespace nephele::detail {
@@ -40,7 +41,7 @@ struct BrickMemo::Table {
   };
 
   float voxelSize = 0.0f;
-  Vec3i first{}, count{};
+  BrickBox bricks;
   std::vector<Entry> entries;
 
   /// The entry of a block of points; null if they are no half of a brick.
@@ -53,17 +54,15 @@ struct BrickMemo::Table {
     const Vec3i voxel{int(std::lrint(corner.x)), int(std::lrint(corner.y)), int(std::lrint(corner.z))};
     if (insideBrick(voxel.x) != 0 || insideBrick(voxel.y) != 0 || insideBrick(voxel.z) % kPlanes != 0)
       return nullptr;
-    const Vec3i b = brickOf(voxel) - first;
-    if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= count.x || b.y >= count.y || b.z >= count.z) return nullptr;
+    const Vec3i brick = brickOf(voxel);
+    if (!bricks.covers(brick)) return nullptr;
     bool isHalf = true;
     for (int i = 0; i < kBlockSize; ++i) {
       const Vec3f p = Vec3f(voxel + Vec3i{i % kBrick, i / kBrick % kBrick, i / kPlane}) * voxelSize;
       isHalf &= (points.x[i] == p.x) & (points.y[i] == p.y) & (points.z[i] == p.z);
     }
     if (!isHalf) return nullptr;
-    const auto brick = (std::size_t(b.z) * std::size_t(count.y) + std::size_t(b.y)) * std::size_t(count.x) +
-                       std::size_t(b.x);
-    return &entries[brick * kHalves + std::size_t(insideBrick(voxel.z) / kPlanes)];
+    return &entries[bricks.numberOf(brick) * kHalves + std::size_t(insideBrick(voxel.z) / kPlanes)];
   }
 };
 
@@ -114,8 +113,8 @@ BrickMemo::BrickMemo(const ScalarField& field, float voxelSize, const Box& box, 
                  high = std::floor(double(box.max[axis]) / width);
     bricks *= high - low + 1;
     if (!(bricks <= mostBricks)) break;
-    table_->first[axis] = int(low);
-    table_->count[axis] = int(high - low) + 1;
+    table_->bricks.first[axis] = int(low);
+    table_->bricks.count[axis] = int(high - low) + 1;
   }
   if (bricks <= mostBricks) table_->entries = std::vector<Table::Entry>(std::size_t(bricks) * kHalves);
   field_ = ScalarField(std::make_shared<MemoNode<Table>>(field.node(), table_));

@@ -21,6 +21,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "levelset/brick_box.h"
 #include "levelset/detail_vdb.h"
 #include "levelset/large_buffer.h"
 #include "levelset/vdb_assembly.h"
@@ -183,7 +184,7 @@ struct DotVolume::Impl {
   std::uint64_t dotCount = 0;
   double mass = 0;
 
-  Vec3i firstBrick{}, brickCount{};
+  BrickBox bricks;
   std::vector<std::int32_t> slots;      ///< Per brick position: number of its samples, or -1.
   std::vector<std::uint32_t> counters;  ///< Per brick position: all 0 between batches.
   std::vector<std::unique_ptr<float[]>> blocks;
@@ -199,21 +200,7 @@ struct DotVolume::Impl {
   float* samples(std::int32_t slot) const {
     return blocks[std::size_t(slot) / kBlock].get() + std::size_t(slot) % kBlock * channels() * kVoxels;
   }
-  std::size_t index(const Vec3i& b) const {
-    const Vec3i p = b - firstBrick;
-    return (std::size_t(p.z) * std::size_t(brickCount.y) + std::size_t(p.y)) * std::size_t(brickCount.x) +
-           std::size_t(p.x);
-  }
-  Vec3i brickAt(std::size_t i) const {
-    const auto nx = std::size_t(brickCount.x), ny = std::size_t(brickCount.y);
-    return firstBrick + Vec3i{int(i % nx), int(i / nx % ny), int(i / nx / ny)};
-  }
-  std::int32_t slotOf(const Vec3i& b) const {
-    const Vec3i p = b - firstBrick;
-    const bool inside =
-        p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < brickCount.x && p.y < brickCount.y && p.z < brickCount.z;
-    return inside ? slots[index(b)] : -1;
-  }
+  std::int32_t slotOf(const Vec3i& b) const { return bricks.covers(b) ? slots[bricks.numberOf(b)] : -1; }
 
   float radiusVoxels(const DotSpans& dots, std::size_t i) const {
     return dots.radii.empty() ? ownRadius : dots.radii[i] / options.voxelSize;
@@ -345,13 +332,13 @@ BrickSpan DotVolume::Impl::makeSplats(const DotSpans& dots) {
 }
 
 void DotVolume::Impl::cover(const BrickSpan& span) {
-  const Vec3i oldFirst = firstBrick, oldCount = brickCount;
+  const BrickBox old = bricks;
   const bool isEmpty = slots.empty();
-  const Vec3i end = oldFirst + oldCount, one{1, 1, 1}, margin{kGrowth, kGrowth, kGrowth};
-  if (!isEmpty && min(oldFirst, span.first) == oldFirst && max(end, span.last + one) == end) return;
+  const Vec3i end = old.first + old.count, one{1, 1, 1}, margin{kGrowth, kGrowth, kGrowth};
+  if (!isEmpty && min(old.first, span.first) == old.first && max(end, span.last + one) == end) return;
   Vec3i low = span.first - margin, high = span.last + one + margin;
   if (!isEmpty) {
-    low = min(low, oldFirst);
+    low = min(low, old.first);
     high = max(high, end);
   }
   const Vec3i count = high - low;
@@ -359,16 +346,16 @@ void DotVolume::Impl::cover(const BrickSpan& span) {
       double(count.x) * count.y * count.z <= kLargestTable,
       fmt::format("dots: they are spread over {} x {} x {} voxels, more than can be held; use larger voxels",
                   8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
-  firstBrick = low;
-  brickCount = count;
-  const std::size_t size = std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z);
-  std::vector<std::int32_t> moved(size, -1);
-  for (int z = 0; z < oldCount.z; ++z)
-    for (int y = 0; y < oldCount.y; ++y)
-      std::copy_n(slots.begin() + (std::ptrdiff_t(z) * oldCount.y + y) * oldCount.x, oldCount.x,
-                  moved.begin() + std::ptrdiff_t(index(oldFirst + Vec3i{0, y, z})));
+  bricks = {low, count};
+  std::vector<std::int32_t> moved(bricks.size(), -1);
+  for (int z = 0; z < old.count.z; ++z)
+    for (int y = 0; y < old.count.y; ++y) {
+      const Vec3i row = old.first + Vec3i{0, y, z};
+      std::copy_n(slots.begin() + std::ptrdiff_t(old.numberOf(row)), old.count.x,
+                  moved.begin() + std::ptrdiff_t(bricks.numberOf(row)));
+    }
   slots = std::move(moved);
-  counters.assign(size, 0);
+  counters.assign(bricks.size(), 0);
 }
 
 /// Counts the entries of every brick and returns the bricks that have some, in the order of the table.
@@ -379,7 +366,7 @@ std::vector<std::size_t> DotVolume::Impl::countEntries(const DotSpans& dots) {
     const std::size_t end = std::min((piece + 1) * kPiece, splatCount);
     for (std::size_t s = piece * kPiece; s < end; ++s)
       bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
-        const std::size_t i = index(b);
+        const std::size_t i = bricks.numberOf(b);
         if (std::atomic_ref(counters[i]).fetch_add(1, std::memory_order_relaxed) == 0)
           found[piece].push_back(i);
       });
@@ -403,7 +390,7 @@ template <bool hasColor>
 void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t position, Splat* first, Splat* last) const {
   const auto isBefore = [](const Splat& a, const Splat& b) { return a.number < b.number; };
   if (!std::is_sorted(first, last, isBefore)) std::sort(first, last, isBefore);
-  const Vec3i origin = brickAt(position) * kBrick;
+  const Vec3i origin = bricks.at(position) * kBrick;
   const BrickSums<hasColor> sums{samples(slots[position])};
   const bool smeared = smears(dots);
   for (; first != last; ++first) {
@@ -452,7 +439,8 @@ void DotVolume::Impl::addBatch(const DotSpans& dots, const Progress& progress) {
   parallelFor(splatCount, kPiece, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s)
       bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
-        entries[std::atomic_ref(counters[index(b)]).fetch_add(1, std::memory_order_relaxed)] = splats[s];
+        entries[std::atomic_ref(counters[bricks.numberOf(b)]).fetch_add(1, std::memory_order_relaxed)] =
+            splats[s];
       });
   });
   parallelFor(touched.size(), 16, [&](std::size_t begin, std::size_t end) {
@@ -578,9 +566,9 @@ std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) c
   density->setGridClass(openvdb::GRID_FOG_VOLUME);
   density->setSaveFloatAsHalf(halfFloat);
   density->setTransform(transform->copy());
-  detail::assembleTree(density->tree(), impl_->firstBrick, impl_->brickCount,
+  detail::assembleTree(density->tree(), impl_->bricks.first, impl_->bricks.count,
                        [&](const Vec3i& position, const openvdb::Coord& origin) -> detail::LeafOrTile {
-                         const std::int32_t slot = impl_->slots[impl_->index(position)];
+                         const std::int32_t slot = impl_->slots[impl_->bricks.numberOf(position)];
                          if (slot < 0) return {nullptr, 0.0f, false};
                          const float* const samples = impl_->samples(slot);
                          const auto isActive = [](float v) { return v > 0; };
@@ -601,7 +589,7 @@ std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) c
   parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (impl_->slots[i] < 0) continue;
-      const Vec3i origin = impl_->brickAt(i) * kBrick;
+      const Vec3i origin = impl_->bricks.at(i) * kBrick;
       leaves[i] =
           std::make_unique<Leaf>(openvdb::Coord(origin.x, origin.y, origin.z), openvdb::Vec3s(0.0f), false);
       if (!fillColors(impl_->samples(impl_->slots[i]), *leaves[i])) leaves[i].reset();

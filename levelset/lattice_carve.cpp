@@ -28,6 +28,7 @@
 #include <memory>
 #include <utility>
 
+#include "levelset/brick_box.h"
 #include "levelset/solid_split.h"
 #include "levelset/tetrahedron_facets.h"
 #include "modeling/error.h"
@@ -724,8 +725,7 @@ class LatticeCarver {
       }
     }
     // One layer of bricks before the table: its last cells lie between the background and the table.
-    first_ = level.firstBrick - Vec3i{1, 1, 1};
-    count_ = level.brickCount + Vec3i{1, 1, 1};
+    places_ = {level.firstBrick - Vec3i{1, 1, 1}, level.brickCount + Vec3i{1, 1, 1}};
   }
 
   Carved run() {
@@ -749,16 +749,12 @@ class LatticeCarver {
   };
 
   void findBricks() {
-    const Vec3i blocks = (count_ + Vec3i{kBlock - 1, kBlock - 1, kBlock - 1}) / kBlock;
-    std::vector<Block> found(std::size_t(blocks.x) * std::size_t(blocks.y) * std::size_t(blocks.z));
+    const BrickBox blocks{{}, (places_.count + Vec3i{kBlock - 1, kBlock - 1, kBlock - 1}) / kBlock};
+    std::vector<Block> found(blocks.size());
     parallelFor(
         found.size(), 1,
         [&](std::size_t begin, std::size_t end) {
-          for (std::size_t i = begin; i < end; ++i) {
-            const int n = int(i);
-            found[i] = blockAt(
-                Vec3i{n % blocks.x, n / blocks.x % blocks.y, n / (blocks.x * blocks.y)} * kBlock + first_);
-          }
+          for (std::size_t i = begin; i < end; ++i) found[i] = blockAt(blocks.at(i) * kBlock + places_.first);
         },
         progress_);
     carving_.largest = double(std::numeric_limits<float>::min());
@@ -767,14 +763,9 @@ class LatticeCarver {
       std::move(block.bricks.begin(), block.bricks.end(), std::back_inserter(bricks_));
     }
     carving_.margin = kMargin * std::min(double(carving_.level.voxelSize), carving_.largest);
-    table_.assign(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z), -1);
-    for (std::size_t i = 0; i < bricks_.size(); ++i) table_[tableIndex(bricks_[i].at)] = std::int32_t(i);
-  }
-
-  std::size_t tableIndex(const Vec3i& brick) const {
-    const Vec3i b = brick - first_;
-    return (std::size_t(b.z) * std::size_t(count_.y) + std::size_t(b.y)) * std::size_t(count_.x) +
-           std::size_t(b.x);
+    table_.assign(places_.size(), -1);
+    for (std::size_t i = 0; i < bricks_.size(); ++i)
+      table_[places_.numberOf(bricks_[i].at)] = std::int32_t(i);
   }
 
   /// Samples -1 to 9 of the bricks, in the world.
@@ -795,7 +786,7 @@ class LatticeCarver {
     for (std::uint32_t k = 0; k < all.undecided.size(); ++k) all.undecided[k] = k;
     bool isDecided = false;
     std::array<float, kRingSamples> samples;
-    const Vec3i end = min(firstBrick + Vec3i{kBlock, kBlock, kBlock}, first_ + count_);
+    const Vec3i end = min(firstBrick + Vec3i{kBlock, kBlock, kBlock}, places_.first + places_.count);
     for (int z = firstBrick.z; z < end.z; ++z)
       for (int y = firstBrick.y; y < end.y; ++y)
         for (int x = firstBrick.x; x < end.x; ++x) {
@@ -878,7 +869,7 @@ class LatticeCarver {
 
   std::uint32_t vertexOf(const CarvedBrick& brick, const Key& key) const {
     const CarvedBrick& owner =
-        key.isOwn() ? brick : bricks_[std::size_t(table_[tableIndex(brick.at + key.owner())])];
+        key.isOwn() ? brick : bricks_[std::size_t(table_[places_.numberOf(brick.at + key.owner())])];
     const auto at = std::lower_bound(owner.keys.begin(), owner.keys.end(), key.inOwner());
     return std::uint32_t(owner.firstVertex + std::size_t(at - owner.keys.begin()));
   }
@@ -918,7 +909,7 @@ class LatticeCarver {
 
   Carving carving_;
   const Progress& progress_;
-  Vec3i first_{}, count_{};
+  BrickBox places_;
   std::vector<CarvedBrick> bricks_;
   /// The number of the brick at each place of the table, or -1.
   std::vector<std::int32_t> table_;

@@ -45,7 +45,7 @@ class BrickLists {
         band_(std::max(options.exteriorVoxels, options.interiorVoxels)) {
     measure();
     shapes_.resize(surface.triangleCount());
-    std::vector<std::atomic<std::uint32_t>> counts(tableSize() + 1);
+    std::vector<std::atomic<std::uint32_t>> counts(bricks_.size() + 1);
     parallelFor(
         surface.triangleCount(), kGrain,
         [&](std::size_t begin, std::size_t end) {
@@ -56,9 +56,9 @@ class BrickLists {
           }
         },
         progress);
-    start_.resize(tableSize() + 1);
+    start_.resize(bricks_.size() + 1);
     std::size_t sum = 0;
-    for (std::size_t b = 0; b <= tableSize(); ++b)
+    for (std::size_t b = 0; b <= bricks_.size(); ++b)
       start_[b] = sum += counts[b].load(std::memory_order_relaxed);
     triangles_.resize(sum);
     for (auto& c : counts) c.store(0, std::memory_order_relaxed);
@@ -74,19 +74,10 @@ class BrickLists {
         progress);
   }
 
-  Vec3i firstBrick() const { return first_; }
-  Vec3i brickCount() const { return count_; }
-  std::size_t tableSize() const {
-    return std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z);
-  }
+  const BrickBox& bricks() const { return bricks_; }
   bool isEmpty(std::size_t brick) const { return start_[brick] == start_[brick + 1]; }
   const TriangleShape* shapes() const { return shapes_.data(); }
   float band() const { return float(band_); }
-
-  Vec3i position(std::size_t brick) const {
-    const auto nx = std::size_t(count_.x), ny = std::size_t(count_.y);
-    return first_ + Vec3i{int(brick % nx), int(brick / nx % ny), int(brick / nx / ny)};
-  }
 
   /// Corner `i` of a triangle relative to the first sample of the brick at `position`, in voxels.
   Vec3f localCorner(std::size_t triangle, int i, const Vec3i& position) const {
@@ -96,7 +87,7 @@ class BrickLists {
   /// The triangles of a brick, near ones first and then by index, so that nothing depends on the threads.
   void place(std::size_t brick, std::vector<PlacedTriangle>& placed) const {
     placed.clear();
-    const Vec3i at = position(brick);
+    const Vec3i at = bricks_.at(brick);
     for (std::size_t i = start_[brick]; i < start_[brick + 1]; ++i)
       placed.push_back(
           placeTriangle(triangles_[i], shapes_[triangles_[i]], localCorner(triangles_[i], 0, at)));
@@ -128,8 +119,8 @@ class BrickLists {
                     high.x - low.x, high.y - low.y, high.z - low.z));
     for (int i = 0; i < 3; ++i) {
       // One brick more on every side: rows start outside.
-      first_[i] = brickBelow(low[i] - band_) - 1;
-      count_[i] = brickBelow(high[i] + band_) + 2 - first_[i];
+      bricks_.first[i] = brickBelow(low[i] - band_) - 1;
+      bricks_.count[i] = brickBelow(high[i] + band_) + 2 - bricks_.first[i];
     }
   }
 
@@ -148,16 +139,14 @@ class BrickLists {
         for (int x = firstOf(low.x); x <= brickBelow(high.x); ++x) {
           const Vec3d middle = Vec3d(x, y, z) * double(kBrick) + Vec3d(1, 1, 1) * (0.5 * (kBrick - 1));
           if (std::abs(dot(n, middle - a)) > reach) continue;
-          visit((std::size_t(z - first_.z) * std::size_t(count_.y) + std::size_t(y - first_.y)) *
-                    std::size_t(count_.x) +
-                std::size_t(x - first_.x));
+          visit(bricks_.numberOf({x, y, z}));
         }
   }
 
   const SurfaceGeometry& surface_;
   double perVoxel_;
   double band_;
-  Vec3i first_{}, count_{};
+  BrickBox bricks_;
   std::vector<TriangleShape> shapes_;
   std::vector<std::size_t> start_;
   std::vector<std::uint32_t> triangles_;
@@ -239,7 +228,7 @@ BlockState workBrick(const BrickLists& lists, const SurfaceGeometry& surface, co
   lists.place(brick, placed);
   nearestTriangles(lists.shapes(), placed.data(), placed.size(), lists.band(), nearest);
 
-  const Vec3i at = lists.position(brick);
+  const Vec3i at = lists.bricks().at(brick);
   Sides sides;
   bool any = false;
   for (int i = 0; i < NearestSamples::kSize; ++i) {
@@ -277,7 +266,7 @@ bool isInsideValue(float value) {
 
 /// Sets constant bricks from the bricks before them along x. False if the sides do not fit.
 bool fillConstants(BandBlocks& band, const std::vector<BlockState>& states) {
-  const auto rowLength = std::size_t(band.brickCount.x);
+  const auto rowLength = std::size_t(band.bricks.count.x);
   std::atomic<bool> fit{true};
   parallelFor(band.table.size() / rowLength, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
@@ -311,9 +300,8 @@ std::optional<BandBlocks> signedBand(const SurfaceGeometry& surface, const BandO
   const BrickLists lists(surface, options, progress);
   BandBlocks band;
   band.options = options;
-  band.firstBrick = lists.firstBrick();
-  band.brickCount = lists.brickCount();
-  band.table.assign(lists.tableSize(), BandBlocks::kOutside);
+  band.bricks = lists.bricks();
+  band.table.assign(band.bricks.size(), BandBlocks::kOutside);
   std::vector<std::size_t> bricks;
   for (std::size_t b = 0; b < band.table.size(); ++b)
     if (!lists.isEmpty(b)) {
@@ -345,13 +333,9 @@ VdbGrid bandToVdb(const BandBlocks& band) {
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(band.options.voxelSize));
   const auto isActive = [half](float value) { return value > -half && value < half; };
-  assembleTree(grid->tree(), band.firstBrick, band.brickCount,
+  assembleTree(grid->tree(), band.bricks.first, band.bricks.count,
                [&](const Vec3i& position, const openvdb::Coord& origin) -> LeafOrTile {
-                 const Vec3i p = position - band.firstBrick;
-                 const std::int32_t entry =
-                     band.table[(std::size_t(p.z) * std::size_t(band.brickCount.y) + std::size_t(p.y)) *
-                                    std::size_t(band.brickCount.x) +
-                                std::size_t(p.x)];
+                 const std::int32_t entry = band.table[band.bricks.numberOf(position)];
                  if (entry < 0) return {nullptr, entry == BandBlocks::kInside ? -half : half, false};
                  const float* samples = band.samples.data() + std::size_t(entry) * BandBlocks::kSamples;
                  float values[BandBlocks::kSamples];
@@ -372,8 +356,8 @@ std::shared_ptr<BrickGrid> bandToBricks(const BandBlocks& band) {
   grid->worldToIndex = {Mat3f::scaling(1.0f / h), {}};
   grid->voxelSize = h;
   grid->background = band.outsideValue();
-  grid->firstBrick = band.firstBrick;
-  grid->brickCount = band.brickCount;
+  grid->firstBrick = band.bricks.first;
+  grid->brickCount = band.bricks.count;
   // Pool: outside, inside, then the blocks that are used, in table order.
   std::vector<std::int32_t> blocks;
   grid->table.resize(band.table.size());

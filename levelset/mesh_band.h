@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "levelset/brick_box.h"
 #include "levelset/surface_geometry.h"
 #include "levelset/vdb_io.h"
 
@@ -22,8 +23,8 @@ struct BandBlocks {
   static constexpr std::size_t kSamples = 512;
 
   BandOptions options;
-  Vec3i firstBrick{}, brickCount{};
-  /// Per brick position, x fastest: index of a block, kOutside or kInside.
+  BrickBox bricks;
+  /// Per brick of these: index of a block, kOutside or kInside.
   std::vector<std::int32_t> table;
   /// kSamples per block, x fastest: world units, positive inside, clamped to the band.
   std::vector<float> samples;

@@ -123,7 +123,8 @@ double PieceLevel::volume() const {
     entry = std::int32_t(samples.size()) - 1;
   }
   // The cells before the first samples have corners in the table's first bricks.
-  const Vec3i first = places.firstBrick - Vec3i{1, 1, 1}, count = places.brickCount + Vec3i{1, 1, 1};
+  const Vec3i one{1, 1, 1};
+  const BrickBox around{places.bricks.first - one, places.bricks.count + one};
   const auto shareOf = [&](const Vec3i& at, detail::BrickCells& cells) {
     std::array<std::size_t, 8> corners;
     for (int i = 0; i < 8; ++i)
@@ -140,15 +141,17 @@ double PieceLevel::volume() const {
     const detail::BrickMask mixed = cells.mixed();
     return mixed.isEmpty() ? 0.0 : detail::volumeShare(cells, mixed, at * kBrick);
   };
-  std::vector<double> slices(std::size_t(count.z));
-  parallelFor(slices.size(), 1, [&](std::size_t begin, std::size_t end) {
+  // In blocks that are always the same, so that the sum is.
+  constexpr std::size_t kBlock = 512;
+  std::vector<double> sums((around.size() + kBlock - 1) / kBlock);
+  parallelFor(sums.size(), 1, [&](std::size_t begin, std::size_t end) {
     detail::BrickCells cells;
-    for (std::size_t z = begin; z < end; ++z)
-      for (int y = 0; y < count.y; ++y)
-        for (int x = 0; x < count.x; ++x) slices[z] += shareOf(first + Vec3i{x, y, int(z)}, cells);
+    for (std::size_t block = begin; block < end; ++block)
+      for (std::size_t i = block * kBlock; i < std::min((block + 1) * kBlock, around.size()); ++i)
+        sums[block] += shareOf(around.at(i), cells);
   });
   const double voxel = double(voxelSize_);
-  return std::accumulate(slices.begin(), slices.end(), 0.0) * voxel * voxel * voxel;
+  return std::accumulate(sums.begin(), sums.end(), 0.0) * voxel * voxel * voxel;
 }
 
 std::shared_ptr<BrickGrid> PieceLevel::toBricks() const {
@@ -158,8 +161,8 @@ std::shared_ptr<BrickGrid> PieceLevel::toBricks() const {
   grid->worldToIndex.linear = Mat3f::scaling(1 / voxelSize_);
   grid->voxelSize = voxelSize_;
   grid->background = -band_;
-  grid->firstBrick = table_->firstBrick;
-  grid->brickCount = table_->brickCount;
+  grid->firstBrick = firstBrick();
+  grid->brickCount = brickCount();
   grid->table = table_->entries;
   const std::size_t stored = storedBricks(), volume = std::size_t(BrickGrid::kVolume);
   grid->values.reserve((2 + stored) * volume);

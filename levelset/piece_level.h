@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "levelset/brick_box.h"
 #include "levelset/brick_grid.h"
 #include "modeling/field.h"
 
@@ -27,20 +28,12 @@ class PieceLevel {
 
   /// The bricks in a table of brick positions, x fastest; entry n > 1 is brick n - 2 of `bricks`.
   struct Table {
-    Vec3i firstBrick, brickCount;
+    BrickBox bricks;
     std::vector<std::int32_t> entries;
 
-    std::size_t indexOf(const Vec3i& brick) const {
-      const Vec3i b = brick - firstBrick;
-      return (std::size_t(b.z) * std::size_t(brickCount.y) + std::size_t(b.y)) * std::size_t(brickCount.x) +
-             std::size_t(b.x);
-    }
     /// kOutside beyond the table.
     std::int32_t entryAt(const Vec3i& brick) const {
-      const Vec3i b = brick - firstBrick;
-      const bool isIn =
-          b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < brickCount.x && b.y < brickCount.y && b.z < brickCount.z;
-      return isIn ? entries[indexOf(brick)] : kOutside;
+      return bricks.covers(brick) ? entries[bricks.numberOf(brick)] : kOutside;
     }
   };
 
@@ -50,8 +43,8 @@ class PieceLevel {
   float voxelSize() const { return voxelSize_; }
   /// How far from the surface values go, world units.
   float band() const { return band_; }
-  const Vec3i& firstBrick() const { return table_->firstBrick; }
-  const Vec3i& brickCount() const { return table_->brickCount; }
+  const Vec3i& firstBrick() const { return table_->bricks.first; }
+  const Vec3i& brickCount() const { return table_->bricks.count; }
   /// Bricks that hold samples.
   std::size_t storedBricks() const;
   /// Bytes of its own table and bricks.

@@ -177,28 +177,20 @@ class Cutter {
   const CutBrick& brick(std::size_t i) const { return cut_.bricks[i]; }
 
   void placeBricks() {
-    Vec3i last;
+    Vec3i first, last;
     for (std::size_t i = 0; i < cut_.count(); ++i) {
-      firstBrick_ = i == 0 ? brick(i).brick : min(firstBrick_, brick(i).brick);
+      first = i == 0 ? brick(i).brick : min(first, brick(i).brick);
       last = i == 0 ? brick(i).brick : max(last, brick(i).brick);
     }
-    brickCount_ = cut_.count() == 0 ? Vec3i{} : last - firstBrick_ + Vec3i{1, 1, 1};
-    brickAt_.assign(std::size_t(brickCount_.x) * std::size_t(brickCount_.y) * std::size_t(brickCount_.z), -1);
-    for (std::size_t i = 0; i < cut_.count(); ++i) brickAt_[tableIndex(brick(i).brick)] = std::int32_t(i);
-  }
-
-  std::size_t tableIndex(const Vec3i& at) const {
-    const Vec3i b = at - firstBrick_;
-    return (std::size_t(b.z) * std::size_t(brickCount_.y) + std::size_t(b.y)) * std::size_t(brickCount_.x) +
-           std::size_t(b.x);
+    if (cut_.count() != 0) places_ = {first, last - first + Vec3i{1, 1, 1}};
+    brickAt_.assign(places_.size(), -1);
+    for (std::size_t i = 0; i < cut_.count(); ++i)
+      brickAt_[places_.numberOf(brick(i).brick)] = std::int32_t(i);
   }
 
   /// The number of the brick at a place, or -1.
   std::int32_t brickAt(const Vec3i& at) const {
-    const Vec3i b = at - firstBrick_;
-    if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= brickCount_.x || b.y >= brickCount_.y || b.z >= brickCount_.z)
-      return -1;
-    return brickAt_[tableIndex(at)];
+    return places_.covers(at) ? brickAt_[places_.numberOf(at)] : -1;
   }
 
   void findParts() {
@@ -600,17 +592,15 @@ class Cutter {
       for (const Near& near : near_.of(i)) {
         PieceLevel::Table& table = tables[near.owner];
         const Vec3i& at = brick(i).brick;
-        const bool isFirst = table.brickCount.x == 0;
-        table.firstBrick = isFirst ? at : min(table.firstBrick, at);
+        const bool isFirst = table.bricks.count.x == 0;
+        table.bricks.first = isFirst ? at : min(table.bricks.first, at);
         last[near.owner] = isFirst ? at : max(last[near.owner], at);
-        table.brickCount.x = 1;
+        table.bricks.count.x = 1;
       }
     for (std::size_t p = 0; p < count; ++p) {
       PieceLevel::Table& table = tables[p];
-      table.brickCount = last[p] - table.firstBrick + Vec3i{1, 1, 1};
-      table.entries.assign(
-          std::size_t(table.brickCount.x) * std::size_t(table.brickCount.y) * std::size_t(table.brickCount.z),
-          PieceLevel::kOutside);
+      table.bricks.count = last[p] - table.bricks.first + Vec3i{1, 1, 1};
+      table.entries.assign(table.bricks.size(), PieceLevel::kOutside);
     }
     const auto samples = std::make_shared<detail::LargeArray>(near_.items.size() * kSamples);
     std::atomic<std::int32_t> used{0};
@@ -623,7 +613,8 @@ class Cutter {
           for (std::size_t i = begin; i < end; ++i)
             for (const Near& near : near_.of(i)) {
               look(view, std::int32_t(i), near.owner, ownedBy(near.owner, std::int32_t(i)));
-              std::int32_t& entry = tables[near.owner].entries[tables[near.owner].indexOf(brick(i).brick)];
+              std::int32_t& entry =
+                  tables[near.owner].entries[tables[near.owner].bricks.numberOf(brick(i).brick)];
               if (view.kind != BrickView::Kind::mixed) {
                 entry = view.kind == BrickView::Kind::inside ? PieceLevel::kInside : PieceLevel::kOutside;
                 continue;
@@ -648,7 +639,7 @@ class Cutter {
   float h_, band_, halfKerf_;
 
   detail::CutBricks cut_;
-  Vec3i firstBrick_{}, brickCount_{};
+  BrickBox places_;
   std::vector<std::int32_t> brickAt_;
   /// Of every brick.
   Lists<Part> parts_;
