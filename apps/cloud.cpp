@@ -68,13 +68,11 @@ void growCloud(const CloudArguments& arguments, Run& run) {
   run.expect(0.9, 1, 2);
   cloud.density = arguments.advection.carried(cloud.density, sources, arguments.seed, run);
   run.stats["layers"] = layersOf(cloud, options, arguments, sources.box());
-
   run.begin("write");
   auto metadata = run.metadata();
   metadata["seed"] = std::to_string(arguments.seed);
   writeVdbFile(arguments.output, {cloud.density}, metadata);
   if (cloud.surface) writeVdbFile(arguments.surface, {*cloud.surface}, metadata);
-
   const VdbGridInfo density = describe(cloud.density);
   run.stats["grid"] = {{"voxel_size", options.voxelSize},
                        {"active_voxels", density.activeVoxels},

@@ -63,7 +63,6 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   run.requireMemory(
       double(volume.memoryBytes()) + estimateRenderBytes(volume, picture.lights, camera, picture.render),
       "make the picture smaller (--size), or the volume with larger voxels");
-
   picture.light.writeShadows(volume, picture.lights, picture.medium, run);
   RenderResult result = picture.picture(volume, camera, run);
   if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
