@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -21,25 +22,52 @@ struct RelaxationOptions {
   /// From this share of the rounds on triangles resist spanning the reference, 0 to 1. Until then they may
   /// tear, which finds places where they cover it.
   double resistsFrom = 0.5;
+  /// How strongly, >= 0.
+  double tearWeight = 10;
 };
 
-/// How many of the object's triangles are torn: the image of a side is longer than 0.3 times the reference's
-/// longest side and than 4.5 times the side itself, once the object has the reference's area.
+/// How many of the object's triangles are torn: once the object has the reference's area, the image of a side
+/// is longer than 4.5 times the side, and than 12 times the side held within 0.15 and 0.3 times the
+/// reference's longest side.
 /// @throws Error if the counts differ or `object` has other faces than triangles.
 std::size_t countTears(const ExactDistance& reference, const Mesh& object, std::span<const Vec3d> images);
 
-/// Moves images along the surface of `reference` so that triangles of the object keep their shape.
-///
-/// `object` is the object laid on the reference (its positions are where the alignment puts them; its size
-/// does not matter), `images` its positions' images. Lowers, over the object's triangles, the sum of
-///   area * limit * log(1 + f / limit),   f = (|J|^2 / 2 + areaWeight (det^2 + 1) / 2) / chi(det),
-///   chi = (det + sqrt(eps^2 + det^2)) / 2,
-/// J the map of a triangle in the tangent plane of the reference: angles and areas, each least where the map
-/// is an isometry, over a barrier against fold-over that is lowered (eps) as the rounds go on. Sides whose
-/// images span more than a fifth of the reference (and three times themselves) resist on top.
-/// Coincident positions stay together. Returns points of the reference. Cost: about 0.3 s per round for
-/// 60 000 triangles on one core. The same at any thread count.
-/// @throws Error if an option is out of its range or the counts differ; Cancelled.
+/// Maps of one object to one reference, relaxed: keeps what does not depend on the images.
+class SurfaceRelaxation {
+ public:
+  /// `object` is the object laid on the reference (its positions are where the alignment puts them; its size
+  /// does not matter). Both must outlive this. @throws Error if `object` has other faces than triangles.
+  SurfaceRelaxation(const ExactDistance& reference, const Mesh& object);
+  ~SurfaceRelaxation();
+
+  /// Moves the images of the object's positions along the surface of the reference so that triangles keep
+  /// their shape.
+  ///
+  /// Lowers, over the object's triangles, the sum of
+  ///   area * limit * log(1 + f / limit),   f = (|J|^2 / 2 + areaWeight (det^2 + 1) / 2) / chi(det),
+  ///   chi = (det + sqrt(eps^2 + det^2)) / 2,
+  /// J the map of a triangle in the tangent plane of the reference: angles and areas, each least where the
+  /// map is an isometry, over a barrier against fold-over that is lowered (eps) as the rounds go on. Sides
+  /// whose images span more than a fifth of the reference (and three times themselves) resist on top.
+  /// Coincident positions stay together. Returns points of the reference. Cost: about 0.2 s per round for
+  /// 60 000 triangles on one core. The same at any thread count.
+  /// @throws Error if an option is out of its range or the counts differ; Cancelled.
+  std::vector<Vec3d> relaxed(std::span<const Vec3d> images, const RelaxationOptions& options = {},
+                             const Progress& progress = silent());
+
+  /// Relaxes only what is around torn triangles (see countTears), with sides that resist more, and then what
+  /// is around those that are turned over or have collapsed, in wider and wider patches as long as some are
+  /// left. A patch stays as it was unless it gets fewer of these and no more torn ones. Cost: that of the
+  /// patches.
+  /// @throws Error if the counts differ; Cancelled.
+  std::vector<Vec3d> mended(std::span<const Vec3d> images, const Progress& progress = silent());
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// SurfaceRelaxation::relaxed, once.
 std::vector<Vec3d> relaxImages(const ExactDistance& reference, const Mesh& object,
                                std::span<const Vec3d> images, const RelaxationOptions& options = {},
                                const Progress& progress = silent());
