@@ -53,10 +53,10 @@ constexpr float kLargestSlope = 3.2f;
 constexpr float kEstimateErrorVoxels = 1.0f;
 /// A surface point counts as found within this many voxels.
 constexpr float kFoundVoxels = 0.1f;
-/// Bricks of a part whose surface points are searched for once more, to count those that were not found: as
-/// many as this, but no more than one of so many.
-constexpr std::size_t kSearchedBricks = 128;
-constexpr std::size_t kLeastStride = 8;
+/// Bricks of a part in which surface points are searched for once more, to count those that were not found,
+/// and of how many samples there one is. Misses come in clusters: few samples of many bricks count better.
+constexpr std::size_t kSearchedBricks = 512;
+constexpr std::size_t kSearchedShare = 4;
 /// A layer with no more positions of bricks than this is baked in one piece: some hundred megabytes.
 constexpr double kWholePositions = 1 << 20;
 /// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
@@ -139,8 +139,10 @@ class NeededNode final : public FieldNode<float> {
         reach_(step.reach),
         margin_(step.margin),
         voxelSize_(voxelSize) {
-    for (std::size_t i = step.index; i < layers.size(); ++i)
+    for (std::size_t i = step.index; i < layers.size(); ++i) {
       heights_.push_back({layers[i].amplitude.node(), layers[i].noise.range(Box::everywhere()).magnitude()});
+      leastReach_ += layers[i].amplitude.range(Box::everywhere()).min * heights_.back().noiseBound;
+    }
   }
 
   static bool isOfUse(const CumuloStep& step, const std::vector<CumuloLayer>& layers) {
@@ -157,13 +159,19 @@ class NeededNode final : public FieldNode<float> {
     const Interval range = displacement_->range(box);
     if (range.isPoint()) return range;
     const Interval level = level_->range(box);
-    if (level.max > 0) return range;
+    const float missing = -level.max - detail::kOuterShare * margin_;
+    // Wherever amplitudes are read from.
+    if (level.max > 0 || leastReach_ >= missing) return range;
     // Levels rise from layer to layer: no later surface point is farther.
     const float depth = std::min(-level.min, reach_ + margin_);
     const Box near = box.expanded(detail::farthestSurfacePoint(depth, voxelSize_));
+    // Amplitudes in a box can take a search: the first often tell.
     float reach = 0;
-    for (const Height& height : heights_) reach += height.amplitude->range(near).max * height.noiseBound;
-    return level.max < -reach - detail::kOuterShare * margin_ ? Interval::of(0) : range;
+    for (const Height& height : heights_) {
+      reach += height.amplitude->range(near).max * height.noiseBound;
+      if (reach >= missing) return range;
+    }
+    return Interval::of(0);
   }
 
  private:
@@ -175,6 +183,8 @@ class NeededNode final : public FieldNode<float> {
   NodePtr<float> displacement_, level_;
   std::vector<Height> heights_;
   float reach_, margin_, voxelSize_;
+  /// What the layers add at least where their noise is largest.
+  float leastReach_ = 0;
 };
 
 /// Bricks begin <= z < end.
@@ -463,7 +473,7 @@ class LayerSampler {
                               Count& total) const {
     std::vector<PlacedBrick> bricks = part.placed;
     std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
-    const std::size_t stride = std::max(kLeastStride, bricks.size() / kSearchedBricks);
+    const std::size_t stride = std::max<std::size_t>(1, bricks.size() / kSearchedBricks);
     const VectorField foot =
         surfacePoint(step.surface, {.steps = options_.newtonSteps, .voxel = options_.voxelSize});
     const float least = step.bound - step.reach - step.margin;
@@ -507,10 +517,17 @@ class LayerSampler {
     reports.push_back(r);
   }
 
-  /// The points whose surface point is not on the surface.
+  /// Of some points, those whose surface point is not on the surface.
   void countMissed(const CumuloStep& step, const VectorField& foot, Samples& samples, Count& count) const {
     std::array<float, kBrickSamples> x, y, z, residual;
-    const std::size_t n = samples.keepEvaluated();
+    const std::size_t evaluated = samples.keepEvaluated();
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < evaluated; i += kSearchedShare, ++n) {
+      samples.x[n] = samples.x[i];
+      samples.y[n] = samples.y[i];
+      samples.z[n] = samples.z[i];
+    }
+    if (n == 0) return;
     const auto first = [&](auto& lane) { return std::span(lane).first(n); };
     foot.eval({first(samples.x), first(samples.y), first(samples.z)},
               Spans<3>{{first(x), first(y), first(z)}});

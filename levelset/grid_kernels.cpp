@@ -21,6 +21,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "levelset/grid_kernels.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -217,6 +218,24 @@ void trilinearGradLoop(const GridMap& map, const PointBlock& points, float* valu
   }
 }
 
+/// The stored sample at a cell's corner, counted from the one before it.
+constexpr int kCorner = rowOffset(1, 1) + 1;
+
+/// A map by which the cell of a point is that of its nearest voxel.
+GridMap nearestMapOf(const BrickGrid& grid) {
+  GridMap map = mapOf(grid);
+  for (float& t : map.translation) t += 0.5f;
+  return map;
+}
+
+template <class Sample>
+void nearestLoop(const GridMap& map, const PointBlock& points, float* values) {
+  for (int i = 0; i < points.count; ++i) {
+    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
+    values[i] = cell.decoded(cell.corner[kCorner]);
+  }
+}
+
 template <class Sample>
 void tricubicLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
@@ -265,6 +284,11 @@ void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* value
 
 }  // namespace
 
+void sampleNearestScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (fillIfEmpty(grid, points, values, nullptr)) return;
+  (grid.isPacked() ? nearestLoop<std::uint16_t> : nearestLoop<float>)(nearestMapOf(grid), points, values);
+}
+
 void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
   if (fillIfEmpty(grid, points, values, nullptr)) return;
   (grid.isPacked() ? trilinearLoop<std::uint16_t> : trilinearLoop<float>)(mapOf(grid), points, values);
@@ -300,6 +324,9 @@ namespace HWY_NAMESPACE {
 // Reading rows takes vectors of a size known when compiling; others use the plain loops.
 #if HWY_HAVE_SCALABLE || HWY_TARGET == HWY_SCALAR
 
+void nearest(const BrickGrid& grid, const PointBlock& points, float* values) {
+  sampleNearestScalar(grid, points, values);
+}
 void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
   sampleTrilinearScalar(grid, points, values);
 }
@@ -381,19 +408,43 @@ HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cell
   hn::Store(hn::And(index, keep), di, entry);
   hn::Store(offset, di, start);
   hn::Store(keep, di, mask);
-  HWY_ALIGN float low[kLanes], unit[kLanes];
+  HWY_ALIGN float low[kLanes], high[kLanes];
   for (int l = 0; l < kLanes; ++l) {
     const auto pool = std::size_t(map.table[entry[l]] & mask[l]);
     cells.corner[l] = map.samples<Sample>() + pool * BrickGrid::kVolume + start[l];
     if constexpr (!std::is_same_v<Sample, float>) {
-      const BrickCode code = brickCode(map.ranges[pool]);
-      low[l] = code.low;
-      unit[l] = code.unit;
+      low[l] = map.ranges[pool].min;
+      high[l] = map.ranges[pool].max;
     }
   }
   if constexpr (!std::is_same_v<Sample, float>) {
+    // As brickCode.
     cells.low = hn::Load(d, low);
-    cells.unit = hn::Load(d, unit);
+    cells.unit = (hn::Load(d, high) - cells.low) / set(BrickCode::kLargest);
+  }
+}
+
+/// Asks for the 4^3 samples around the points of a vector, which are read later.
+template <class Sample>
+HWY_INLINE void prefetch(const Cells<Sample>& cells) {
+  for (int l = 0; l < kLanes; ++l)
+    for (int k = 0; k < 4; ++k) {
+      hwy::Prefetch(cells.corner[l] + rowOffset(0, k));
+      hwy::Prefetch(cells.corner[l] + rowOffset(3, k) + 3);
+    }
+}
+
+/// Calls `interpolate(i, cells)` for every vector of points, with what the next one reads on its way.
+template <class Sample, class Interpolate>
+HWY_INLINE void forEachVector(const GridMap& map, const PointBlock& points, const Interpolate& interpolate) {
+  Cells<Sample> cells[2];
+  locate(map, points, 0, cells[0]);
+  for (int i = 0, k = 0; i < points.count; i += kLanes, k ^= 1) {
+    if (i + kLanes < points.count) {
+      locate(map, points, i + kLanes, cells[k ^ 1]);
+      prefetch(cells[k ^ 1]);
+    }
+    interpolate(i, cells[k]);
   }
 }
 
@@ -484,9 +535,7 @@ template <class Sample>
 void trilinearGradOf(const GridMap& map, const PointBlock& points, float* values,
                      const BlockLanes<3>& grads) {
   const D d;
-  Cells<Sample> cells;
-  for (int i = 0; i < points.count; i += kLanes) {
-    locate(map, points, i, cells);
+  forEachVector<Sample>(map, points, [&](int i, const Cells<Sample>& cells) HWY_ATTR {
     const V fx = cells.fx, fy = cells.fy, fz = cells.fz;
     V v[2], dx[2], dy[2], r[2][2];
     for (int k = 0; k < 2; ++k) {
@@ -508,6 +557,18 @@ void trilinearGradOf(const GridMap& map, const PointBlock& points, float* values
     const V half = cells.decodedSlope(hn::Set(d, 0.5f));
     storeGradient(map, half * lerp(dx[0], dx[1], fz), half * lerp(dy[0], dy[1], fz),
                   half * lerp(dz[0], dz[1], fy), grads, i);
+  });
+}
+
+template <class Sample>
+void nearestOf(const GridMap& map, const PointBlock& points, float* values) {
+  const D d;
+  Cells<Sample> cells;
+  HWY_ALIGN float samples[kLanes];
+  for (int i = 0; i < points.count; i += kLanes) {
+    locate(map, points, i, cells);
+    for (int l = 0; l < kLanes; ++l) samples[l] = float(cells.corner[l][kCorner]);
+    hn::StoreU(cells.decoded(hn::Load(d, samples)), d, values + i);
   }
 }
 
@@ -558,9 +619,7 @@ void tricubicOf(const GridMap& map, const PointBlock& points, float* values) {
 template <class Sample>
 void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
   const D d;
-  Cells<Sample> cells;
-  for (int i = 0; i < points.count; i += kLanes) {
-    locate(map, points, i, cells);
+  forEachVector<Sample>(map, points, [&](int i, const Cells<Sample>& cells) HWY_ATTR {
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
     const Weights sx = cubicSlopes(cells.fx), sy = cubicSlopes(cells.fy);
     V v[4], dx[4], dy[4];
@@ -579,9 +638,12 @@ void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values,
     hn::StoreU(cells.decoded(wz(v)), d, values + i);
     storeGradient(map, cells.decodedSlope(wz(dx)), cells.decodedSlope(wz(dy)),
                   cells.decodedSlope(sz.offset(v[0], v[1], v[2], v[3])), grads, i);
-  }
+  });
 }
 
+void nearest(const BrickGrid& grid, const PointBlock& points, float* values) {
+  (grid.isPacked() ? nearestOf<std::uint16_t> : nearestOf<float>)(nearestMapOf(grid), points, values);
+}
 void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
   (grid.isPacked() ? trilinearOf<std::uint16_t> : trilinearOf<float>)(mapOf(grid), points, values);
 }
@@ -608,10 +670,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace nephele {
 
+HWY_EXPORT(nearest);
 HWY_EXPORT(trilinear);
 HWY_EXPORT(trilinearGrad);
 HWY_EXPORT(tricubic);
 HWY_EXPORT(tricubicGrad);
+
+void sampleNearest(const BrickGrid& grid, const PointBlock& points, float* values) {
+  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(nearest)(grid, points, values);
+}
 
 void sampleTrilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
   if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(trilinear)(grid, points, values);

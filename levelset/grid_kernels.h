@@ -31,6 +31,10 @@ void sampleTricubic(const BrickGrid& grid, const PointBlock& points, float* valu
 void sampleTricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
                         const BlockLanes<3>& grads);
 
+/// The value of the nearest sample: what tells cheaply about how large an interpolated value is. The
+/// background where the nearest voxel lies outside the table.
+void sampleNearest(const BrickGrid& grid, const PointBlock& points, float* values);
+
 /// The same as plain loops: the truth that the vector code is tested against, bit for bit.
 void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values);
 void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
@@ -38,5 +42,6 @@ void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, 
 void sampleTricubicScalar(const BrickGrid& grid, const PointBlock& points, float* values);
 void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
                               const BlockLanes<3>& grads);
+void sampleNearestScalar(const BrickGrid& grid, const PointBlock& points, float* values);
 
 }  // namespace nephele

@@ -11,6 +11,9 @@
 // limited to the samples that interpolation reads, with the fine level's sign. So does the second level of a
 // mesh whose triangles are small beside its voxels.
 //
+// A point is evaluated at the levels that have a say there: a look at the nearest sample, from coarse to
+// fine, tells which is the first. What it says is what all levels in turn would give, bit for bit.
+//
 // Near the medial axis, where the nearest point jumps, a coarse level rounds the ridge over one of its own
 // voxels.
 #include "levelset/mesh_distance.h"
@@ -32,6 +35,8 @@ namespace nephele {
 namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
+/// Each level doubles the voxel: no band needs more.
+constexpr std::size_t kMostLevels = 32;
 
 /// Distance in fine voxels where level `index` takes over from the one before.
 double startOf(int index) {
@@ -55,50 +60,6 @@ struct Level {
   float nextStart = 0.0f, nextBlend = 1.0f;
   /// The next level holds more of this side; else the side's band ends within this level.
   bool continuesOutside = false, continuesInside = false;
-
-  /// -1 or 1 for points where the nearest sample alone tells that the next levels take over wholly, on the
-  /// outside or the inside; else 0. Looks at one sample in place of interpolating 64.
-  void sidesBeyond(const PointBlock& points, float* sides) const {
-    // What lies between a point and its nearest sample, and the error of interpolation, voxels.
-    constexpr float kNearestVoxels = 1.25f;
-    std::array<std::array<std::int32_t, kBlockSize>, 3> voxel;
-    std::array<std::int32_t, kBlockSize> isInside;
-    std::array<std::size_t, kBlockSize> pools, codes;
-    std::fill_n(isInside.begin(), points.count, 1);
-    const std::array<const float*, 3> lanes{points.x, points.y, points.z};
-    for (int axis = 0; axis < 3; ++axis) {
-      // Counted from the table's first voxel, so that numbers are not negative and cutting them off is a
-      // floor.
-      const float scale = grid->worldToIndex.linear(axis, axis);
-      const float shift = 0.5f - float(grid->firstBrick[axis] * kBrick);
-      const float end = float(grid->brickCount[axis] * kBrick);
-      const float* lane = lanes[std::size_t(axis)];
-      std::int32_t* to = voxel[std::size_t(axis)].data();
-      for (int i = 0; i < points.count; ++i) {
-        const float q = lane[i] * scale + shift;
-        const bool inside = q >= 0 && q < end;
-        to[i] = std::int32_t(inside ? q : 0.0f);
-        isInside[std::size_t(i)] &= std::int32_t(inside);
-      }
-    }
-    const auto nx = std::size_t(grid->brickCount.x), ny = std::size_t(grid->brickCount.y);
-    const float beyond = nextStart + nextBlend + kNearestVoxels * grid->voxelSize;
-    const float outside = continuesOutside ? -beyond : -std::numeric_limits<float>::infinity();
-    const float inside = continuesInside ? beyond : std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < std::size_t(points.count); ++i) {
-      const int x = voxel[0][i], y = voxel[1][i], z = voxel[2][i];
-      pools[i] = std::size_t(
-          grid->table[(std::size_t(z >> 3) * ny + std::size_t(y >> 3)) * nx + std::size_t(x >> 3)]);
-      codes[i] = pools[i] * BrickGrid::kVolume + std::size_t(sampleOffset(x & 7, y & 7, z & 7));
-      __builtin_prefetch(grid->codes.data() + codes[i]);
-    }
-    for (std::size_t i = 0; i < std::size_t(points.count); ++i) {
-      const Interval& range = grid->ranges[pools[i]];
-      const float share = float(grid->codes[codes[i]]) * (1 / BrickCode::kLargest);
-      const float sample = range.min + (range.max - range.min) * share;
-      sides[i] = float((int(sample > inside) - int(sample < outside)) * isInside[i]);
-    }
-  }
 };
 
 struct Levels {
@@ -114,29 +75,31 @@ class MeshDistanceNode final : public FieldNode<float> {
       : levels_(std::move(levels)), first_(first), last_(last) {}
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
-    evalFrom(first_, points, values[0], nullptr, scratch);
+    evalLevels(points, values[0], nullptr, scratch);
     clampValues(points.count, values[0], nullptr);
   }
 
   void evalGrad(const PointBlock& points, const BlockLanes<1>& values, const BlockLanes<3>& grads,
                 Scratch& scratch) const override {
-    evalFrom(first_, points, values[0], &grads, scratch);
+    evalLevels(points, values[0], &grads, scratch);
     clampValues(points.count, values[0], &grads);
   }
 
   Interval range(const Box& box) const override {
     const Interval everything{-levels_->exteriorBand, levels_->interiorBand};
     if (box.isEmpty() || !isFinite(box.min) || !isFinite(box.max)) return everything;
-    // Distance changes by no more than the way; interpolation adds less than a voxel of the level at either
-    // end.
+    // Distance changes by no more than the way from the middle of each eighth; interpolation adds less than a
+    // voxel of the level at either end.
     const Vec3f centre = box.center();
-    const float middle = valueAt(centre);
-    const float way = length(box.max - centre) * 1.0001f + 1e-5f * length(centre);
-    const float error = 2.0f * coarsestVoxel(std::abs(middle) + way);
-    // Beyond its bands the field is constant, and distance there is anywhere beyond.
-    Interval result{middle - way - error, middle + way + error};
-    if (middle <= -levels_->exteriorBand) result.min = -levels_->exteriorBand;
-    if (middle >= levels_->interiorBand) result.max = levels_->interiorBand;
+    const Vec3f quarter = 0.5f * (box.max - centre);
+    const float way = length(quarter) * 1.0001f + 1e-5f * length(centre);
+    float low = std::numeric_limits<float>::infinity(), high = -low;
+    for (const float middle : valuesInEighths(centre, quarter)) {
+      const float error = 2.0f * coarsestVoxel(std::abs(middle) + way);
+      low = std::min(low, middle - way - error);
+      high = std::max(high, middle + way + error);
+    }
+    Interval result{low, high};
     if (result.magnitude() < levels_->all[0].nextStart) {
       const Interval bricks = fineRange(box);
       result = {std::max(result.min, bricks.min), std::min(result.max, bricks.max)};
@@ -170,15 +133,19 @@ class MeshDistanceNode final : public FieldNode<float> {
     return voxelOf(level);
   }
 
-  float valueAt(const Vec3f& p) const {
+  /// Before they are cut off at the bands. Beyond what the levels hold, any number beyond the bands.
+  std::array<float, 8> valuesInEighths(const Vec3f& centre, const Vec3f& quarter) const {
     Scratch& scratch = Scratch::local();
     Scratch::Frame frame(scratch);
     const BlockLanes<3> xyz = frame.lanes<3>();
-    for (std::size_t c = 0; c < 3; ++c) xyz[c][0] = p[int(c)];
-    const PointBlock point = scratch.pointBlock(xyz, 1);
-    const BlockLanes<1> value = frame.lanes<1>();
-    eval(point, value, scratch);
-    return value[0][0];
+    for (std::size_t c = 0; c < 3; ++c)
+      for (int i = 0; i < 8; ++i)
+        xyz[c][i] = centre[int(c)] + ((i >> c & 1) != 0 ? quarter[int(c)] : -quarter[int(c)]);
+    float* values = frame.lane();
+    evalLevels(scratch.pointBlock(xyz, 8), values, nullptr, scratch);
+    std::array<float, 8> result;
+    std::copy_n(values, 8, result.begin());
+    return result;
   }
 
   /// Hull of the fine bricks that a box touches.
@@ -213,64 +180,180 @@ class MeshDistanceNode final : public FieldNode<float> {
       grads ? sampleTricubicGrad(grid, points, values, *grads) : sampleTricubic(grid, points, values);
   }
 
-  /// Some points of a block, and where they stand in it.
-  struct Selection {
-    BlockLanes<3> points;
-    std::array<std::uint16_t, kBlockSize> source;
-    int count = 0;
+  /// Values (and gradients) wanted at a block of points, and the level that each starts from.
+  struct Asked {
+    const PointBlock& points;
+    float* values;
+    const BlockLanes<3>* grads;
+    /// The points that start from level k are order[begin[k]] .. order[begin[k + 1] - 1].
+    std::array<int, kMostLevels + 1> begin;
+    std::array<std::uint8_t, kBlockSize> order;
 
-    explicit Selection(Scratch::Frame& frame) : points(frame.lanes<3>()) {}
-    void add(const PointBlock& from, int i, bool isIn) {
-      points[0][count] = from.x[i];
-      points[1][count] = from.y[i];
-      points[2][count] = from.z[i];
-      source[std::size_t(count)] = std::uint16_t(i);
-      count += isIn;
+    Asked(const PointBlock& block, float* to, const BlockLanes<3>* gradsTo)
+        : points(block), values(to), grads(gradsTo) {}
+
+    int startingAt(std::size_t level) const { return begin[level + 1] - begin[level]; }
+    int startingAfter(std::size_t level) const { return points.count - begin[level + 1]; }
+    void sortByStart(const std::int32_t* start) {
+      std::int32_t differing = 0;
+      for (int i = 0; i < points.count; ++i) differing += std::int32_t(start[i] != start[0]);
+      if (differing == 0) {
+        for (int level = 0; level < int(begin.size()); ++level)
+          begin[std::size_t(level)] = level <= start[0] ? 0 : points.count;
+        return;
+      }
+      std::array<int, kMostLevels + 1> next{};
+      for (int i = 0; i < points.count; ++i) ++next[std::size_t(start[i])];
+      int sum = 0;
+      for (std::size_t level = 0; level < next.size(); ++level) {
+        const int count = next[level];
+        begin[level] = next[level] = sum;
+        sum += count;
+      }
+      for (int i = 0; i < points.count; ++i)
+        order[std::size_t(next[std::size_t(start[i])]++)] = std::uint8_t(i);
     }
   };
 
-  void evalFrom(std::size_t index, const PointBlock& points, float* values, const BlockLanes<3>* grads,
-                Scratch& scratch) const {
-    if (index == last_) return sample(index, points, values, grads);
-    const Level& level = levels_->all[index];
+  /// Points that one level leaves to the next, and where they stand in its block.
+  struct Far {
+    BlockLanes<3> points;
+    std::array<std::uint8_t, kBlockSize> source;
+    int count = 0;
+
+    explicit Far(Scratch::Frame& frame) : points(frame.lanes<3>()) {}
+  };
+
+  void evalLevels(const PointBlock& points, float* values, const BlockLanes<3>* grads,
+                  Scratch& scratch) const {
+    if (first_ == last_) return sample(last_, points, values, grads);
     Scratch::Frame frame(scratch);
-    // What this level says of a point that it leaves to the next ones.
-    constexpr float kBeyondAll = std::numeric_limits<float>::max();
-    Selection far(frame);
-    if (index == 0) {
-      // Found out as cheaply as asked for.
-      sample(index, points, values, grads);
-    } else {
-      Selection near(frame);
-      float* sides = frame.lane();
-      level.sidesBeyond(points, sides);
-      for (int i = 0; i < points.count; ++i) {
-        values[i] = sides[i] * kBeyondAll;
-        near.add(points, i, sides[i] == 0);
+    std::array<std::int32_t, kBlockSize> start;
+    findStarts(points, start.data(), scratch);
+    Asked asked(points, values, grads);
+    asked.sortByStart(start.data());
+    evalFrom(first_, asked, Far(frame), nullptr, nullptr, scratch);
+  }
+
+  /// For each point the first level that has a say there, or one before it.
+  void findStarts(const PointBlock& points, std::int32_t* start, Scratch& scratch) const {
+    constexpr int kFew = 16;
+    std::size_t coarsest = last_;
+    if (points.count > 2 * kFew) {
+      // A few points tell where to look.
+      Scratch::Frame frame(scratch);
+      const BlockLanes<3> few = frame.lanes<3>();
+      for (int k = 0; k < kFew; ++k) {
+        const int i = (2 * k + 1) * points.count / (2 * kFew);
+        few[0][k] = points.x[i];
+        few[1][k] = points.y[i];
+        few[2][k] = points.z[i];
       }
-      if (near.count == points.count) {
-        sample(index, points, values, grads);
-      } else if (near.count > 0) {
-        float* nearValues = frame.lane();
-        const BlockLanes<3> nearGrads = frame.lanes<3>();
-        sample(index, scratch.pointBlock(near.points, near.count), nearValues, grads ? &nearGrads : nullptr);
-        for (int k = 0; k < near.count; ++k) {
-          const int i = near.source[std::size_t(k)];
-          values[i] = nearValues[k];
-          if (grads)
-            for (std::size_t c = 0; c < 3; ++c) (*grads)[c][i] = nearGrads[c][k];
-        }
+      findStartsFrom(last_, scratch.pointBlock(few, kFew), start, scratch);
+      const auto most = std::size_t(*std::max_element(start, start + kFew));
+      coarsest = most > first_ ? std::min(most + 1, last_) : first_;
+    }
+    findStartsFrom(coarsest, points, start, scratch);
+  }
+
+  /// Values between these bounds are a level's own; beyond them it says nothing.
+  struct Bounds {
+    float outside, inside;
+
+    Bounds(const Level& level, float beyond)
+        : outside(level.continuesOutside ? -beyond : -std::numeric_limits<float>::infinity()),
+          inside(level.continuesInside ? beyond : std::numeric_limits<float>::infinity()) {}
+    /// 1 beyond them, else 0; by numbers, for loops of whole vectors.
+    std::int32_t leave(float value) const {
+      return std::int32_t(value < outside) | std::int32_t(value > inside);
+    }
+  };
+
+  /// From coarse to fine, as most points far out need few looks then. The nearest sample of a level tells
+  /// whether all finer ones leave a point to it wholly, and whether it leaves the point to the next one.
+  void findStartsFrom(std::size_t coarsest, const PointBlock& points, std::int32_t* start,
+                      Scratch& scratch) const {
+    // What lies between a point and its nearest sample, and the errors of interpolation there, voxels: by the
+    // level itself, and by those that are finer.
+    constexpr float kOwnVoxels = 1.25f, kFinerVoxels = 1.75f;
+    const auto none = std::int32_t(first_);
+    std::fill_n(start, points.count, none);
+    Scratch::Frame frame(scratch);
+    float* nearest = frame.lane();
+    int left = points.count;
+    for (std::size_t level = coarsest; level > first_ && left > 0; --level) {
+      const Level &own = levels_->all[level], &finer = levels_->all[level - 1];
+      sampleNearest(*own.grid, points, nearest);
+      const Bounds ofFiner(finer, finer.nextStart + finer.nextBlend + kFinerVoxels * voxelOf(level));
+      const Bounds ofOwn(own, own.nextStart + own.nextBlend + kOwnVoxels * voxelOf(level));
+      const std::int32_t here = std::int32_t(level) - none, next = level < last_ ? 1 : 0;
+      left = 0;
+      for (int i = 0; i < points.count; ++i) {
+        const std::int32_t taken = std::int32_t(start[i] == none) & ofFiner.leave(nearest[i]);
+        start[i] += taken * here + (taken & ofOwn.leave(nearest[i]) & next);
+        left += std::int32_t(start[i] == none);
       }
     }
+  }
 
-    const float outside = level.continuesOutside ? -level.nextStart : -std::numeric_limits<float>::infinity();
-    const float inside = level.continuesInside ? level.nextStart : std::numeric_limits<float>::infinity();
-    for (int i = 0; i < points.count; ++i) far.add(points, i, (values[i] < outside) | (values[i] > inside));
-    if (far.count == 0) return;
+  /// Writes the values of the asked points that start from level `index` or later, and those of the points
+  /// that the level before leaves to it to `values` and `grads`.
+  void evalFrom(std::size_t index, const Asked& asked, const Far& left, float* values,
+                const BlockLanes<3>* grads, Scratch& scratch) const {
+    while (left.count == 0 && asked.startingAt(index) == 0) ++index;
+    const int starting = asked.startingAt(index), count = left.count + starting;
+    Scratch::Frame frame(scratch);
+    if (starting == asked.points.count) {
+      sample(index, asked.points, asked.values, asked.grads);
+      if (index < last_) blendWithNext(index, asked, asked.points, asked.values, asked.grads, scratch);
+      return;
+    }
+    const BlockLanes<3> here = frame.lanes<3>();
+    const std::array<const float*, 3> from{asked.points.x, asked.points.y, asked.points.z};
+    const std::uint8_t* order = asked.order.data() + asked.begin[index];
+    for (std::size_t c = 0; c < 3; ++c) {
+      float* to = std::copy_n(left.points[c], left.count, here[c]);
+      for (int k = 0; k < starting; ++k) to[k] = from[c][order[k]];
+    }
+    float* hereValues = frame.lane();
+    const BlockLanes<3> hereGradLanes = frame.lanes<3>();
+    const BlockLanes<3>* hereGrads = asked.grads ? &hereGradLanes : nullptr;
+    const PointBlock points = scratch.pointBlock(here, count);
+    sample(index, points, hereValues, hereGrads);
+    if (index < last_) blendWithNext(index, asked, points, hereValues, hereGrads, scratch);
+    const auto hand = [&](const float* lane, float* toLeft, float* toAsked) {
+      if (left.count > 0) std::copy_n(lane, left.count, toLeft);
+      for (int k = 0; k < starting; ++k) toAsked[order[k]] = lane[left.count + k];
+    };
+    hand(hereValues, values, asked.values);
+    if (!asked.grads) return;
+    for (std::size_t c = 0; c < 3; ++c)
+      hand(hereGradLanes[c], grads ? (*grads)[c] : nullptr, (*asked.grads)[c]);
+  }
+
+  /// Blends what level `index` says at `points` with the levels after it where those have a say, and
+  /// evaluates the points that start there.
+  void blendWithNext(std::size_t index, const Asked& asked, const PointBlock& points, float* values,
+                     const BlockLanes<3>* grads, Scratch& scratch) const {
+    const Level& level = levels_->all[index];
+    const Bounds own(level, level.nextStart);
+    std::int32_t farCount = 0;
+    for (int i = 0; i < points.count; ++i) farCount += own.leave(values[i]);
+    if (farCount == 0 && asked.startingAfter(index) == 0) return;
+    Scratch::Frame frame(scratch);
+    Far far(frame);
+    if (farCount > 0) {
+      for (int i = 0; i < points.count; ++i) {
+        far.source[std::size_t(far.count)] = std::uint8_t(i);
+        far.count += own.leave(values[i]);
+      }
+      const std::array<const float*, 3> from{points.x, points.y, points.z};
+      for (std::size_t c = 0; c < 3; ++c)
+        for (int k = 0; k < far.count; ++k) far.points[c][k] = from[c][far.source[std::size_t(k)]];
+    }
     float* farValues = frame.lane();
     const BlockLanes<3> farGrads = frame.lanes<3>();
-    evalFrom(index + 1, scratch.pointBlock(far.points, far.count), farValues, grads ? &farGrads : nullptr,
-             scratch);
+    evalFrom(index + 1, asked, far, farValues, grads ? &farGrads : nullptr, scratch);
     const float perBlend = 1.0f / level.nextBlend;
     for (int k = 0; k < far.count; ++k) {
       const int i = far.source[std::size_t(k)];

@@ -48,6 +48,7 @@ class LayerNode final : public FieldNode<float> {
         bound_(step.bound),
         noiseBound_(step.layer->noise.range(Box::everywhere()).magnitude()),
         amplitudeVaries_(!step.layer->amplitude.range(Box::everywhere()).isPoint()),
+        growsEverywhere_(options.bake && step.layer->amplitude.range(Box::everywhere()).min > 0),
         startsFromLevel_(options.bake && surface_ == level_) {
     projection_.steps = options.newtonSteps;
     projection_.voxel = options.voxelSize;
@@ -103,7 +104,7 @@ class LayerNode final : public FieldNode<float> {
   Interval range(const Box& box) const override {
     const Interval level = level_->range(box);
     if (level.max < band_.min || level.min > band_.max) return Interval::of(0);
-    if (!amplitudeVaries_) return {-bound_, bound_};
+    if (!amplitudeVaries_ || growsEverywhere_) return {-bound_, bound_};
     const float deepest = std::max(-std::max(level.min, band_.min), std::min(level.max, band_.max));
     const float most = amplitude_->range(box.expanded(farthest(deepest))).max * noiseBound_;
     return most > 0 ? Interval{-std::min(most, bound_), std::min(most, bound_)} : Interval::of(0);
@@ -162,6 +163,8 @@ class LayerNode final : public FieldNode<float> {
   Interval band_;
   float bound_, noiseBound_;
   bool amplitudeVaries_;
+  /// A bake only asks where the layer adds nothing: no need to search the amplitudes in every box.
+  bool growsEverywhere_;
   /// Whether the level's gradient is worth asking for at once: most points that are sampled lie in the band.
   bool startsFromLevel_;
   SurfacePointOptions projection_;

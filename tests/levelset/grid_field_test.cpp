@@ -99,12 +99,19 @@ TEST_P(EveryTargetAndStorage, KernelsGiveTheBitsOfThePlainLoops) {
                  {result[1][1].data(), result[1][2].data(), result[1][3].data()});
       return result;
     };
+    const auto nearestOf = [&](auto kernel) {
+      Lanes result{};
+      kernel(*grid, block, result[0].data());
+      return result;
+    };
+    const Lanes nearest = nearestOf(sampleNearestScalar);
     const auto trilinear = run(sampleTrilinearScalar, sampleTrilinearGradScalar);
     const auto tricubic = run(sampleTricubicScalar, sampleTricubicGradScalar);
     EXPECT_EQ(trilinear[0][0], trilinear[1][0]);
     EXPECT_EQ(tricubic[0][0], tricubic[1][0]);
     for (std::int64_t rest = targets; rest != 0; rest &= rest - 1) {
       choose(rest & -rest);
+      EXPECT_TRUE(compare(nearestOf(sampleNearest), nearest)) << hwy::TargetName(rest & -rest);
       const auto vectorTrilinear = run(sampleTrilinear, sampleTrilinearGrad);
       const auto vectorTricubic = run(sampleTricubic, sampleTricubicGrad);
       for (int k = 0; k < 2; ++k) {
@@ -113,6 +120,32 @@ TEST_P(EveryTargetAndStorage, KernelsGiveTheBitsOfThePlainLoops) {
       }
     }
   }
+}
+
+TEST(GridField, NearestSampleIsThatOfTheRoundedPosition) {
+  // The truth is BrickGrid::at. Packed: within 1/131070 of a brick's range, at most 2 here.
+  for (const bool isPacked : {false, true})
+    for (const Affine& map : {Affine{}, turned()}) {
+      const auto grid = denseGrid({-2, -1, 0}, {3, 2, 2}, scatter, map, -0.5f);
+      const auto floats = std::make_shared<BrickGrid>(*grid);
+      if (isPacked) pack(*grid);
+      const Points random = randomPoints(256, {-20, -12, -4}, {12, 12, 20});
+      Points points;
+      for (std::size_t i = 0; i < random.size(); ++i) points.add(map(random.point(i)));
+      const PointBlock block{points.x.data(), points.y.data(), points.z.data(), kBlockSize, 1};
+      std::array<float, kBlockSize> values;
+      sampleNearest(*grid, block, values.data());
+      int covered = 0;
+      for (std::size_t i = 0; i < random.size(); ++i) {
+        const Vec3f p = random.point(i);
+        const Vec3i voxel{int(std::floor(p.x + 0.5f)), int(std::floor(p.y + 0.5f)),
+                          int(std::floor(p.z + 0.5f))};
+        EXPECT_NEAR(values[i], floats->at(voxel), isPacked ? 2.0f / 131070 : 0.0f);
+        covered += floats->covers(brickOf(voxel));
+      }
+      EXPECT_GT(covered, 50);
+      EXPECT_LT(covered, 250);
+    }
 }
 
 TEST(GridField, ReproducesAffineFunctionsAndTheirGradient) {

@@ -107,6 +107,54 @@ TEST(MeshDistance, ChangesContinuouslyFromLevelToLevel) {
   EXPECT_LT(worst / kVoxel, 0.05f + 0.01f);
 }
 
+TEST(MeshDistance, SaysTheSameOfAPointInAnyCompany) {
+  // Points are grouped by the levels that have a say there. Alone, each starts from its own; a far one
+  // among many near ones passes through all levels.
+  const ScalarField distance = meshDistance(torusMesh(1.0, 0.4, 96, 48),
+                                            {.voxelSize = 0.02, .exteriorBand = 1.5, .interiorBand = 0.2});
+  const Points far = randomPoints({{-3, -3, -2}, {3, 3, 2}}, 3000, 7);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> angle(0.0f, 6.2831f), beside(-0.01f, 0.01f);
+  const auto onSurface = [&] {
+    const float u = angle(random), v = angle(random), tube = 0.4f + beside(random);
+    return Vec3f{(1 + tube * std::cos(v)) * std::cos(u), (1 + tube * std::cos(v)) * std::sin(u),
+                 tube * std::sin(v)};
+  };
+  using Lanes = std::array<std::vector<float>, 4>;
+  const auto evaluated = [&](const Points& points) {
+    Lanes l;
+    for (auto& lane : l) lane.resize(points.size());
+    distance.evalGrad(points.spans(), l[0], {{{l[1], l[2], l[3]}}});
+    return l;
+  };
+  constexpr std::size_t kBlock = 256;
+  Points lonely;
+  for (std::size_t i = 0; i < far.size(); ++i)
+    for (std::size_t k = 0; k < kBlock; ++k) lonely.add(k == 3 ? far[i] : onSurface());
+  const Lanes together = evaluated(far), amongNear = evaluated(lonely);
+  int levels = 0;
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    Points single;
+    single.add(far[i]);
+    const Lanes alone = evaluated(single);
+    for (std::size_t c = 0; c < 4; ++c) {
+      ASSERT_EQ(alone[c][0], together[c][i]);
+      ASSERT_EQ(alone[c][0], amongNear[c][i * kBlock + 3]);
+    }
+    levels |= 1 << int(std::abs(alone[0][0]) / 0.1f);
+  }
+  // Distances of all sizes up to the band.
+  EXPECT_EQ(levels & 0x7ff, 0x7ff);
+}
+
+TEST(MeshDistance, RangeTellsThatABoxLiesBeyondTheBands) {
+  const ScalarField distance = meshDistance(torusMesh(1.0, 0.4, 96, 48),
+                                            {.voxelSize = 0.02, .exteriorBand = 0.7, .interiorBand = 0.1});
+  // 1.2 from the torus, with three voxels of the coarsest level (8 fine ones) in hand.
+  const Interval outside = distance.range({{-0.1f, -0.1f, 1.6f}, {0.1f, 0.1f, 1.8f}});
+  EXPECT_EQ(outside, Interval::of(-0.7f));
+}
+
 TEST(MeshDistance, RangeContainsItsValuesAndRestrictionKeepsThem) {
   const ScalarField distance = meshDistance(torusMesh(1.0, 0.4, 96, 48),
                                             {.voxelSize = 0.02, .exteriorBand = 0.7, .interiorBand = 0.1});
