@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "modeling/error.h"
@@ -92,55 +93,44 @@ struct Sample {
 class Look {
  public:
   virtual ~Look() = default;
-  virtual Sample at(const Vec3d& p) const = 0;
+  /// `cursor`: of an earlier place of the same point, or of one near it.
+  virtual Sample at(const Vec3d& p, ExactDistance::Cursor& cursor) const = 0;
 };
 
 class ExactLook final : public Look {
  public:
   explicit ExactLook(const ExactDistance& shape) : shape_(shape), frame_(shape) {}
-  Sample at(const Vec3d& p) const override {
-    const ExactDistance::Hit hit = shape_.at(frame_.toWorld(p), cursor_);
+  Sample at(const Vec3d& p, ExactDistance::Cursor& cursor) const override {
+    const ExactDistance::Hit hit = shape_.at(frame_.toWorld(p), cursor);
     return {hit.distance / frame_.size, hit.gradient};
   }
 
  private:
   const ExactDistance& shape_;
   Frame frame_;
-  // Points come in the order of triangles; a fit runs on one thread.
-  mutable ExactDistance::Cursor cursor_;
 };
 
-/// Samples on a coarse lattice around the shape, interpolated.
+/// Samples on a coarse lattice around the shape, found when they are first asked for, interpolated.
 class CoarseLook final : public Look {
  public:
-  explicit CoarseLook(const ExactDistance& shape) : values_(kCount * kCount * kCount) {
-    const Frame frame(shape);
-    ExactDistance::Cursor cursor;
-    std::size_t next = 0;
-    for (int z = 0; z < kCount; ++z)
-      for (int y = 0; y < kCount; ++y)
-        for (int x = 0; x < kCount; ++x) {
-          const Vec3d p = Vec3d(x, y, z) * kSpacing - Vec3d(kHalf, kHalf, kHalf);
-          values_[next++] = float(shape.at(frame.toWorld(p), cursor).distance / frame.size);
-        }
-  }
-  Sample at(const Vec3d& p) const override {
+  explicit CoarseLook(const ExactDistance& shape)
+      : shape_(shape), frame_(shape), values_(kCount * kCount * kCount, kUnknown) {}
+  Sample at(const Vec3d& p, ExactDistance::Cursor&) const override {
     // Outside the lattice: on from the nearest point of its box.
     constexpr double kInside = kHalf * (1 - 1e-9);
     Vec3d q;
     for (int c = 0; c < 3; ++c) q[c] = std::clamp(p[c], -kInside, kInside);
-    std::size_t at = 0, stride = 1;
+    Vec3i cell;
     double t[3];
-    for (int c = 0; c < 3; ++c, stride *= kCount) {
+    for (int c = 0; c < 3; ++c) {
       const double u = (q[c] + kHalf) / kSpacing;
-      const int cell = std::min(int(u), kCount - 2);
-      t[c] = u - cell;
-      at += std::size_t(cell) * stride;
+      cell[c] = std::min(int(u), kCount - 2);
+      t[c] = u - cell[c];
     }
     Sample result{0, {}};
-    for (std::size_t k = 0; k < 8; ++k) {
-      const std::size_t dx = k & 1, dy = k >> 1 & 1, dz = k >> 2;
-      const double value = double(values_[at + dx + kCount * (dy + kCount * dz)]);
+    for (int k = 0; k < 8; ++k) {
+      const int dx = k & 1, dy = k >> 1 & 1, dz = k >> 2;
+      const double value = double(valueAt(cell + Vec3i{dx, dy, dz}));
       const double wx = dx ? t[0] : 1 - t[0], wy = dy ? t[1] : 1 - t[1], wz = dz ? t[2] : 1 - t[2];
       result.value += value * wx * wy * wz;
       result.gradient += Vec3d(dx ? wy * wz : -wy * wz, dy ? wx * wz : -wx * wz, dz ? wx * wy : -wx * wy) *
@@ -157,7 +147,22 @@ class CoarseLook final : public Look {
  private:
   static constexpr int kCount = 20;
   static constexpr double kHalf = 0.75, kSpacing = 2 * kHalf / (kCount - 1);
-  std::vector<float> values_;
+  static constexpr float kUnknown = std::numeric_limits<float>::infinity();
+
+  float valueAt(const Vec3i& node) const {
+    float& value = values_[std::size_t((node.z * kCount + node.y) * kCount + node.x)];
+    if (value == kUnknown) {
+      const Vec3d p = Vec3d(node) * kSpacing - Vec3d(kHalf, kHalf, kHalf);
+      value = float(shape_.at(frame_.toWorld(p), cursor_).distance / frame_.size);
+    }
+    return value;
+  }
+
+  const ExactDistance& shape_;
+  Frame frame_;
+  // A fit runs on one thread.
+  mutable ExactDistance::Cursor cursor_;
+  mutable std::vector<float> values_;
 };
 
 /// Parameters of a similarity between two frames: unit quaternion (w, x, y, z), log of the scale, shift.
@@ -199,7 +204,8 @@ class SimilarityCost final : public ceres::CostFunction {
         object_(object),
         objectPoints_(objectPoints),
         referencePoints_(referencePoints),
-        soften_{width} {
+        soften_{width},
+        cursors_(objectPoints.size() + referencePoints.size()) {
     set_num_residuals(int(objectPoints.size() + referencePoints.size()));
     mutable_parameter_block_sizes()->push_back(8);
   }
@@ -241,15 +247,23 @@ class SimilarityCost final : public ceres::CostFunction {
   void lookUp(const double* q, double scale, const Vec3d& shift) const {
     if (!samples_.empty() && std::equal(at_.begin(), at_.end(), q)) return;
     samples_.clear();
-    for (const Vec3d& x : objectPoints_) samples_.push_back(reference_.at(turnBy(q, 1, x) * scale + shift));
-    for (const Vec3d& y : referencePoints_)
-      samples_.push_back(object_.at(turnBy(q, -1, (y - shift) / scale)));
+    std::size_t next = 0;
+    const auto look = [&](const Look& at, const Vec3d& p) {
+      ExactDistance::Cursor& cursor = cursors_[next];
+      // Points come in the order of triangles.
+      if (!cursor.hasPoint && next > 0) cursor = cursors_[next - 1];
+      ++next;
+      samples_.push_back(at.at(p, cursor));
+    };
+    for (const Vec3d& x : objectPoints_) look(reference_, turnBy(q, 1, x) * scale + shift);
+    for (const Vec3d& y : referencePoints_) look(object_, turnBy(q, -1, (y - shift) / scale));
     std::copy_n(q, at_.size(), at_.begin());
   }
 
   const Look &reference_, &object_;
   const std::vector<Vec3d>&objectPoints_, &referencePoints_;
   Softened soften_;
+  mutable std::vector<ExactDistance::Cursor> cursors_;
   mutable std::vector<Sample> samples_;
   mutable Parameters at_{};
 };
@@ -482,7 +496,10 @@ class LatticeCost final : public ceres::CostFunction {
  public:
   LatticeCost(const Look& reference, std::vector<LatticePoint> points, std::vector<PlanePoint> planes,
               double smoothness)
-      : reference_(reference), points_(std::move(points)), planes_(std::move(planes)) {
+      : reference_(reference),
+        points_(std::move(points)),
+        planes_(std::move(planes)),
+        cursors_(points_.size()) {
     for (int z = 0; z < kPerAxis; ++z)
       for (int y = 0; y < kPerAxis; ++y)
         for (int x = 0; x < kPerAxis; ++x) addDifferences(x, y, z);
@@ -505,8 +522,9 @@ class LatticeCost final : public ceres::CostFunction {
     const Softened soften{kWidth};
     double slope = 0;
     const double perPoint = 1 / std::sqrt(double(points_.size()));
-    for (const LatticePoint& point : points_) {
-      const Sample l = reference_.at(point.from + displacementOf(point.stencil, control));
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const LatticePoint& point = points_[i];
+      const Sample l = reference_.at(point.from + displacementOf(point.stencil, control), cursors_[i]);
       *residuals++ = perPoint * soften(l.value, slope);
       addRow(point.stencil, l.gradient * (slope * perPoint));
     }
@@ -553,6 +571,7 @@ class LatticeCost final : public ceres::CostFunction {
   const Look& reference_;
   std::vector<LatticePoint> points_;
   std::vector<PlanePoint> planes_;
+  mutable std::vector<ExactDistance::Cursor> cursors_;
   std::vector<Difference> differences_;
   double weight_ = 0;
 };
@@ -597,11 +616,12 @@ BendLattice alignLattice(const ExactDistance& reference, const ExactDistance& ob
     // Each reference point asks for the place of the bent object that was nearest in the round before: found
     // by taking the point back through the bend, approximately, and then to the nearest point of the object.
     std::vector<PlanePoint> planes;
+    ExactDistance::Cursor ofObject, ofReference;
     for (const Vec3d& to : wanted) {
       const Vec3d before = to - displacementOf(stencilAt(low, high, to), control.data());
       const Vec3d world = (target.toWorld(before) - similarity.shift) / similarity.scale;
-      const Vec3d from = aligned(object.at(similarity.turnedBack(world)).point);
-      planes.push_back({stencilAt(low, high, from), from, to, look.at(to).gradient});
+      const Vec3d from = aligned(object.at(similarity.turnedBack(world), ofObject).point);
+      planes.push_back({stencilAt(low, high, from), from, to, look.at(to, ofReference).gradient});
     }
     ceres::Problem problem;
     problem.AddResidualBlock(new LatticeCost(look, points, std::move(planes), options.smoothness), nullptr,
