@@ -163,6 +163,9 @@ class Cutter {
     parallelFor(reach_.size(), 16 * kBricksPerTask, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) reach_[i] = reachOf(parts_.items[i]);
     });
+    reachOfBrick_.assign(cut_.count(), 0);
+    for (std::size_t i = 0; i < cut_.count(); ++i)
+      for (std::size_t p = parts_.first[i]; p < parts_.first[i + 1]; ++p) reachOfBrick_[i] |= reach_[p].near;
     near_ = makeLists<Near>(cut_.count(), [&](std::size_t i, std::vector<Near>& list) { listNear(i, list); });
     progress_.begin("write pieces");
     return writePieces();
@@ -270,13 +273,14 @@ class Cutter {
     for (int n = 0; n < kNeighbours; ++n) {
       const Vec3i direction = neighbour(n);
       const std::int32_t other = brickAt(brick(i).brick + direction);
-      if (other < 0) continue;
+      // As the other brick sees this one.
+      const std::uint32_t bit = 1u << (kNeighbours - 1 - n);
+      if (other < 0 || (reachOfBrick_[std::size_t(other)] & bit) == 0) continue;
       const bool isAfter = std::min({direction.x, direction.y, direction.z}) >= 0;
       const int before = direction.x + 2 * direction.y + 4 * direction.z;
       for (std::size_t p = parts_.first[std::size_t(other)]; p < parts_.first[std::size_t(other) + 1]; ++p) {
         const Reach& reach = reach_[p];
-        // As the part sees this brick.
-        if ((reach.near >> (kNeighbours - 1 - n) & 1) == 0) continue;
+        if ((reach.near & bit) == 0) continue;
         const auto known = std::find_if(list.begin() + begin, list.end(),
                                         [&](const Near& near) { return near.owner == reach.owner; });
         const bool isSurface = isAfter && (reach.touches >> before & 1) != 0;
@@ -645,6 +649,8 @@ class Cutter {
   Lists<Part> parts_;
   /// Of every part.
   std::vector<Reach> reach_;
+  /// Of every brick: `Reach::near` of its parts together.
+  std::vector<std::uint32_t> reachOfBrick_;
   Lists<Near> near_;
   std::uint32_t shellCount_ = 0;
   std::vector<std::uint32_t> codeOfOwner_;
