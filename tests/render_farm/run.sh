@@ -174,7 +174,7 @@ done
 
 # The end of the work as a job that waits for the array. Not afterok: that remembers the failure.
 sheet=$(sbatch --parsable --dependency="afterany:$job" --output="$folder/tasks/sheet.log" --wrap \
-  "'$program' turntable cloud.vdb -o 'frames/cloud.####.exr' --frames 1-8 --size 160x90 --skip-existing --contact-sheet sheet.png")
+  "'$program' turntable cloud.vdb -o 'frames/cloud.####.exr' --frames 1-8 --size 160x90 --samples 400 --skip-existing --contact-sheet sheet.png")
 wait_for 60 "the contact sheet" test -e sheet.png
 "$program" info sheet.png | grep -q PNG || fail "the contact sheet is not whole"
 grep -q 'skipping 8 of 8' tasks/sheet.log || fail "job $sheet made frames again"
