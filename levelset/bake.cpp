@@ -98,10 +98,10 @@ class Baker {
       voxels_.first[axis] = int(std::floor(double(options.box.min[axis]) / options.voxelSize));
       voxels_.last[axis] = int(std::ceil(double(options.box.max[axis]) / options.voxelSize));
       // Cells that touch these voxels, so that values fall off to the background without a jump.
-      firstBrick_[axis] = brickOf(voxels_.first[axis] - 2);
-      brickCount_[axis] = brickOf(voxels_.last[axis] + 1) - firstBrick_[axis] + 1;
+      places_.first[axis] = brickOf(voxels_.first[axis] - 2);
+      places_.count[axis] = brickOf(voxels_.last[axis] + 1) - places_.first[axis] + 1;
     }
-    const double positions = double(brickCount_.x) * brickCount_.y * brickCount_.z;
+    const double positions = double(places_.count.x) * places_.count.y * places_.count.z;
     require(positions < kMostBricks,
             fmt::format(
                 "bake: the box spans {:.4g} bricks of 8^3 voxels of {:g}, but at most {:.4g} are possible",
@@ -231,7 +231,7 @@ class Baker {
   template <class Take>
   void split(const Cell& cell, const Take& take) const {
     const int half = cell.size / 2;
-    const Vec3i end = firstBrick_ + brickCount_;
+    const Vec3i end = places_.first + places_.count;
     for (int i = 0; i < 8; ++i) {
       const Vec3i b = cell.brick + Vec3i{i & 1, i >> 1 & 1, i >> 2} * half;
       if (b.x < end.x && b.y < end.y && b.z < end.z) take(Cell{b, half, cell.node});
@@ -240,8 +240,8 @@ class Baker {
 
   std::vector<Cell> cellsToEvaluate(const NodePtr<T>& node) {
     int size = kCellSize;
-    while (size < std::max({brickCount_.x, brickCount_.y, brickCount_.z})) size *= 2;
-    std::vector<Cell> level{{firstBrick_, size, node}};
+    while (size < std::max({places_.count.x, places_.count.y, places_.count.z})) size *= 2;
+    std::vector<Cell> level{{places_.first, size, node}};
     for (; size > kCellSize && !level.empty(); size /= 2) {
       std::vector<std::vector<Cell>> parts(level.size());
       std::vector<std::vector<Settled>> settled(level.size());
@@ -392,17 +392,6 @@ class Baker {
     }
   }
 
-  std::size_t tableIndex(const Vec3i& b) const {
-    const Vec3i i = b - firstBrick_;
-    return (std::size_t(i.z) * brickCount_.y + std::size_t(i.y)) * brickCount_.x + std::size_t(i.x);
-  }
-
-  bool covers(const Vec3i& b) const {
-    const Vec3i i = b - firstBrick_;
-    return i.x >= 0 && i.y >= 0 && i.z >= 0 && i.x < brickCount_.x && i.y < brickCount_.y &&
-           i.z < brickCount_.z;
-  }
-
   /// Number of a constant in the pool; a new one follows the others.
   std::int32_t constant(const Values& value) {
     const auto [found, isNew] = constantNumbers_.try_emplace(value, std::int32_t(constants_.size()));
@@ -413,10 +402,10 @@ class Baker {
   void enter(const Settled& settled) {
     const std::int32_t entry = constant(settled.value);
     const Vec3i end =
-        min(settled.brick + Vec3i{settled.size, settled.size, settled.size}, firstBrick_ + brickCount_);
+        min(settled.brick + Vec3i{settled.size, settled.size, settled.size}, places_.first + places_.count);
     for (int z = settled.brick.z; z < end.z; ++z)
       for (int y = settled.brick.y; y < end.y; ++y)
-        std::fill_n(table_.begin() + std::ptrdiff_t(tableIndex({settled.brick.x, y, z})),
+        std::fill_n(table_.begin() + std::ptrdiff_t(places_.numberOf({settled.brick.x, y, z})),
                     end.x - settled.brick.x, entry);
   }
 
@@ -433,7 +422,7 @@ class Baker {
           const Vec3i side{x, y, z};
           if (side == Vec3i{}) continue;
           const Standing s =
-              covers(leaf.brick + side) ? standingAt(leaf.brick + side) : Standing{&background_};
+              places_.covers(leaf.brick + side) ? standingAt(leaf.brick + side) : Standing{&background_};
           if (!s.constant && !s.leaf) return std::nullopt;
           if (s.constant)
             for (int c = 0; c < kLanes; ++c) ranges[c] = including(ranges[c], (*s.constant)[c]);
@@ -465,14 +454,14 @@ class Baker {
   /// The bricks that are no constants, in order; fills the table, for a pool in which they follow the
   /// constants.
   std::vector<Leaf> judged(const std::vector<CellResult>& results) {
-    table_.assign(std::size_t(brickCount_.x) * brickCount_.y * brickCount_.z, 0);
+    table_.assign(places_.size(), 0);
     constant(background_);
     for (const Settled& s : settled_) enter(s);
     std::vector<Leaf> leaves;
     for (const CellResult& result : results) {
       for (const Settled& s : result.settled) enter(s);
       for (const Leaf& leaf : result.leaves) {
-        table_[tableIndex(leaf.brick)] = std::int32_t(-1 - std::int64_t(leaves.size()));
+        table_[places_.numberOf(leaf.brick)] = std::int32_t(-1 - std::int64_t(leaves.size()));
         leaves.push_back(leaf);
       }
     }
@@ -481,7 +470,7 @@ class Baker {
     parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         constants[i] = collapsed(leaves[i], [&](const Vec3i& b) {
-          const std::int32_t entry = table_[tableIndex(b)];
+          const std::int32_t entry = table_[places_.numberOf(b)];
           return entry >= 0 ? Standing{&constants_[std::size_t(entry)]}
                             : Standing{nullptr, &leaves[std::size_t(-1 - entry)]};
         });
@@ -489,7 +478,7 @@ class Baker {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       if (constants[i])
-        table_[tableIndex(leaves[i].brick)] = constant(*constants[i]);
+        table_[places_.numberOf(leaves[i].brick)] = constant(*constants[i]);
       else
         leaves[kept++] = leaves[i];
     }
@@ -497,7 +486,7 @@ class Baker {
     const std::size_t poolSize = constants_.size() + leaves.size();
     require(double(poolSize) < kMostBricks, "bake: too many bricks; use larger voxels");
     for (std::size_t i = 0; i < leaves.size(); ++i)
-      table_[tableIndex(leaves[i].brick)] = std::int32_t(constants_.size() + i);
+      table_[places_.numberOf(leaves[i].brick)] = std::int32_t(constants_.size() + i);
     return leaves;
   }
 
@@ -518,8 +507,7 @@ class Baker {
     BrickSamples all;
     all.voxelSize = options_.voxelSize;
     all.background = background_[0];
-    all.firstBrick = firstBrick_;
-    all.brickCount = brickCount_;
+    all.places = places_;
     all.table = std::move(table_);
     SampleStore constants(constants_.size() * kOwn);
     for (std::size_t i = 0; i < constants_.size(); ++i) {
@@ -545,8 +533,8 @@ class Baker {
     grid->indexToWorld.linear = Mat3f::scaling(options_.voxelSize);
     grid->worldToIndex.linear = Mat3f::scaling(1.0f / options_.voxelSize);
     grid->background = background_[component];
-    grid->firstBrick = firstBrick_;
-    grid->brickCount = brickCount_;
+    grid->firstBrick = places_.first;
+    grid->brickCount = places_.count;
     detail::reserveLarge(grid->values, poolSize * BrickGrid::kVolume);
     for (const Values& value : constants_)
       grid->values.insert(grid->values.end(), BrickGrid::kVolume, value[component]);
@@ -585,7 +573,7 @@ class Baker {
   Values background_;
   std::vector<float> backgroundSamples_;
   VoxelBox voxels_;
-  Vec3i firstBrick_, brickCount_;
+  BrickBox places_;
   std::vector<Settled> settled_;
   std::vector<std::int32_t> table_;
   std::vector<Values> constants_;

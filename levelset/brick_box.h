@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "modeling/math.h"
 
@@ -27,5 +30,18 @@ struct BrickBox {
     return first + Vec3i{int(number % nx), int(number / nx % ny), int(number / nx / ny)};
   }
 };
+
+/// A table of one number per brick, in a larger box: -1 for the bricks that are new.
+inline std::vector<std::int32_t> enlarged(const std::vector<std::int32_t>& table, const BrickBox& box,
+                                          const BrickBox& larger) {
+  std::vector<std::int32_t> result(larger.size(), -1);
+  for (int z = 0; z < box.count.z; ++z)
+    for (int y = 0; y < box.count.y; ++y) {
+      const Vec3i row = box.first + Vec3i{0, y, z};
+      std::copy_n(table.begin() + std::ptrdiff_t(box.numberOf(row)), box.count.x,
+                  result.begin() + std::ptrdiff_t(larger.numberOf(row)));
+    }
+  return result;
+}
 
 }  // namespace nephele

@@ -60,14 +60,7 @@ void BrickNumbers::set(const Vec3i& brick, std::int32_t number) {
             fmt::format("advection: the result spreads over {} x {} x {} voxels, more than can be held",
                         8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
     bricks_ = {first, count};
-    std::vector<std::int32_t> numbers(bricks_.size(), -1);
-    for (int z = 0; z < old.count.z; ++z)
-      for (int y = 0; y < old.count.y; ++y) {
-        const Vec3i row = old.first + Vec3i{0, y, z};
-        std::copy_n(numbers_.begin() + std::ptrdiff_t(old.numberOf(row)), old.count.x,
-                    numbers.begin() + std::ptrdiff_t(bricks_.numberOf(row)));
-      }
-    numbers_ = std::move(numbers);
+    numbers_ = enlarged(numbers_, old, bricks_);
   }
   numbers_[bricks_.numberOf(brick)] = number;
 }

@@ -65,7 +65,7 @@ void BrickSamples::append(const std::vector<Vec3i>& bricks) {
   Store store{SampleStore(bricks.size() * kCount), bricks[0].z};
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     store.lastZ = std::max(store.lastZ, bricks[i].z);
-    table[tableIndex(bricks[i])] = std::int32_t(pool.size());
+    table[places.numberOf(bricks[i])] = std::int32_t(pool.size());
     placed.push_back({std::int32_t(pool.size()), bricks[i]});
     pool.push_back(store.samples.data() + i * kCount);
     ranges.emplace_back();
@@ -83,16 +83,14 @@ void BrickSamples::separate() {
   for (std::size_t i = 0; i < table.size(); ++i) {
     const auto constant = std::size_t(table[i]);
     if (constant == 0 || constant >= constants) continue;
-    const auto row = int(i / std::size_t(brickCount.x));
-    bricks.push_back(firstBrick +
-                     Vec3i{int(i % std::size_t(brickCount.x)), row % brickCount.y, row / brickCount.y});
+    bricks.push_back(places.at(i));
     source.push_back(constant);
   }
   pool.erase(pool.begin() + 1, pool.begin() + std::ptrdiff_t(constants));
   ranges.erase(ranges.begin() + 1, ranges.begin() + std::ptrdiff_t(constants));
   for (PlacedBrick& brick : placed) {
     brick.pool -= std::int32_t(constants - 1);
-    table[tableIndex(brick.brick)] = brick.pool;
+    table[places.numberOf(brick.brick)] = brick.pool;
   }
   const std::size_t first = pool.size();
   append(bricks);
@@ -108,8 +106,8 @@ std::shared_ptr<BrickGrid> emptyPackedGrid(const BrickSamples& samples) {
   grid->indexToWorld.linear = Mat3f::scaling(samples.voxelSize);
   grid->worldToIndex.linear = Mat3f::scaling(1.0f / samples.voxelSize);
   grid->background = samples.background;
-  grid->firstBrick = samples.firstBrick;
-  grid->brickCount = samples.brickCount;
+  grid->firstBrick = samples.places.first;
+  grid->brickCount = samples.places.count;
   grid->table.resize(samples.table.size());
   grid->codes.resize(kVolume);
   grid->ranges.push_back(Interval::of(samples.background));
@@ -129,7 +127,7 @@ void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packi
   for (const PlacedBrick& brick : samples.placed)
     if (packing[std::size_t(brick.pool)] != Packing::leaveOut) chosen.push_back(brick);
   const auto groupOf = [&](const PlacedBrick& brick) {
-    return (brick.brick.z - samples.firstBrick.z) / kGroup;
+    return (brick.brick.z - samples.places.first.z) / kGroup;
   };
   std::stable_sort(chosen.begin(), chosen.end(),
                    [&](const PlacedBrick& a, const PlacedBrick& b) { return groupOf(a) < groupOf(b); });
@@ -157,7 +155,7 @@ void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packi
       }
     });
     // The next group reads one brick below its own.
-    const int needed = samples.firstBrick.z + (group + 1) * kGroup - 1;
+    const int needed = samples.places.first.z + (group + 1) * kGroup - 1;
     for (BrickSamples::Store& store : samples.stores)
       if (store.lastZ < needed) store.samples = {};
     first = last;

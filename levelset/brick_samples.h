@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "levelset/brick_box.h"
 #include "levelset/brick_grid.h"
 #include "levelset/grid_field.h"
 
@@ -60,8 +61,8 @@ struct BrickSamples {
 
   float voxelSize = 1.0f;
   float background = 0.0f;
-  Vec3i firstBrick{}, brickCount{};
-  /// Index into the pool for each brick position, x fastest. Pool brick 0 is all background.
+  BrickBox places;
+  /// Index into the pool for each brick of these. Pool brick 0 is all background.
   std::vector<std::int32_t> table;
   /// kCount samples of each, x fastest. Bricks of nothing but the background may share those of brick 0.
   std::vector<float*> pool;
@@ -71,17 +72,8 @@ struct BrickSamples {
   std::vector<PlacedBrick> placed;
   std::vector<Store> stores;
 
-  bool covers(const Vec3i& b) const {
-    const Vec3i i = b - firstBrick;
-    return i.x >= 0 && i.y >= 0 && i.z >= 0 && i.x < brickCount.x && i.y < brickCount.y && i.z < brickCount.z;
-  }
-  std::size_t tableIndex(const Vec3i& b) const {
-    const Vec3i i = b - firstBrick;
-    return (std::size_t(i.z) * std::size_t(brickCount.y) + std::size_t(i.y)) * std::size_t(brickCount.x) +
-           std::size_t(i.x);
-  }
   /// Pool index of the brick at brick coordinates `b`; 0 outside the table.
-  std::int32_t poolIndex(const Vec3i& b) const { return covers(b) ? table[tableIndex(b)] : 0; }
+  std::int32_t poolIndex(const Vec3i& b) const { return places.covers(b) ? table[places.numberOf(b)] : 0; }
   /// Where sample (x, y, z) of a brick stands among its samples; coordinates 0 to 7.
   static constexpr int offset(int x, int y, int z) {
     return (z * BrickGrid::kBrick + y) * BrickGrid::kBrick + x;

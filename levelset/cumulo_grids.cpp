@@ -215,14 +215,13 @@ BrickSamples noSamples(const Box& box, float voxelSize, const Slab& slab) {
   BrickSamples samples;
   samples.voxelSize = voxelSize;
   for (int axis = 0; axis < 3; ++axis) {
-    samples.firstBrick[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-    samples.brickCount[axis] =
-        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.firstBrick[axis];
+    samples.places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+    samples.places.count[axis] =
+        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.places.first[axis];
   }
-  samples.firstBrick.z = slab.begin;
-  samples.brickCount.z = slab.end - slab.begin;
-  const Vec3i n = samples.brickCount;
-  samples.table.resize(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+  samples.places.first.z = slab.begin;
+  samples.places.count.z = slab.end - slab.begin;
+  samples.table.resize(samples.places.size());
   detail::SampleStore background(BrickSamples::kCount);
   samples.pool.push_back(background.data());
   samples.ranges.push_back(Interval::of(0));
@@ -259,9 +258,9 @@ BrickSamples windowOf(const std::deque<Part>& parts, const Slab& slab, const Box
     std::vector<Vec3i> bricks;
     std::vector<const float*> sources;
     for (const Part& part : parts) {
-      const Vec3i first = max(window.firstBrick, part.samples.firstBrick);
-      const Vec3i end =
-          min(window.firstBrick + window.brickCount, part.samples.firstBrick + part.samples.brickCount);
+      const Vec3i first = max(window.places.first, part.samples.places.first);
+      const Vec3i end = min(window.places.first + window.places.count,
+                            part.samples.places.first + part.samples.places.count);
       const int lastZ = std::min({z + kStoreBricks, end.z, part.slab.end});
       Vec3i b;
       for (b.z = std::max({z, first.z, part.slab.begin}); b.z < lastZ; ++b.z)

@@ -347,14 +347,7 @@ void DotVolume::Impl::cover(const BrickSpan& span) {
       fmt::format("dots: they are spread over {} x {} x {} voxels, more than can be held; use larger voxels",
                   8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
   bricks = {low, count};
-  std::vector<std::int32_t> moved(bricks.size(), -1);
-  for (int z = 0; z < old.count.z; ++z)
-    for (int y = 0; y < old.count.y; ++y) {
-      const Vec3i row = old.first + Vec3i{0, y, z};
-      std::copy_n(slots.begin() + std::ptrdiff_t(old.numberOf(row)), old.count.x,
-                  moved.begin() + std::ptrdiff_t(bricks.numberOf(row)));
-    }
-  slots = std::move(moved);
+  slots = enlarged(slots, old, bricks);
   counters.assign(bricks.size(), 0);
 }
 
