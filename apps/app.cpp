@@ -8,9 +8,9 @@
 #include <iostream>
 #include <new>
 
-#include "apps/config_file.h"
+#include "apps/options/config_file.h"
 #include "apps/program_run.h"
-#include "levelset/output_file.h"
+#include "nephele/levelset/io/output_file.h"
 
 namespace nephele::apps {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/options.h"
-#include "modeling/progress.h"
+#include "apps/options/options.h"
+#include "nephele/modeling/base/progress.h"
 
 namespace nephele::apps {
 

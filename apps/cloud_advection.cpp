@@ -1,9 +1,9 @@
 #include "apps/cloud_advection.h"
 
-#include "apps/velocity_options.h"
-#include "levelset/advection.h"
-#include "levelset/advection_files.h"
-#include "modeling/field_ops.h"
+#include "apps/options/velocity_options.h"
+#include "nephele/levelset/flow/advection.h"
+#include "nephele/levelset/flow/advection_files.h"
+#include "nephele/modeling/field/operations.h"
 
 namespace nephele::apps {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "apps/app.h"
-#include "apps/cloud_quantities.h"
-#include "apps/field_sources.h"
-#include "levelset/vdb_io.h"
+#include "apps/options/cloud_quantities.h"
+#include "apps/options/field_sources.h"
+#include "nephele/levelset/io/vdb_io.h"
 
 namespace nephele::apps {
 

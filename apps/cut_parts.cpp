@@ -3,12 +3,12 @@
 
 #include <filesystem>
 
-#include "apps/cut_options.h"
-#include "levelset/cut_input.h"
-#include "levelset/level_set_pieces.h"
-#include "levelset/marching_cubes.h"
-#include "levelset/mesh_io.h"
-#include "modeling/error.h"
+#include "apps/options/cut_options.h"
+#include "nephele/levelset/cut/cut_input.h"
+#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/cut_options.h"
+#include "apps/options/cut_options.h"
 
 namespace nephele::apps {
 

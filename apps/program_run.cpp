@@ -10,8 +10,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "levelset/output_file.h"
-#include "modeling/error.h"
+#include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {

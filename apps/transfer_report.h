@@ -3,8 +3,8 @@
 #include <string>
 
 #include "apps/app.h"
-#include "levelset/mesh_warp.h"
-#include "levelset/transfer_quality.h"
+#include "nephele/levelset/warp/mesh_warp.h"
+#include "nephele/levelset/warp/transfer_quality.h"
 
 namespace nephele::apps {
 

@@ -11,11 +11,11 @@
 #include <future>
 
 #include "apps/turntable_plan.h"
-#include "modeling/error.h"
-#include "render/backdrop.h"
-#include "render/contact_sheet.h"
-#include "render/exr_io.h"
-#include "render/png_io.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/contact_sheet.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/png_io.h"
+#include "nephele/render/scene/backdrop.h"
 
 namespace nephele::apps {
 namespace {

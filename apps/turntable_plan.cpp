@@ -9,11 +9,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "levelset/output_file.h"
-#include "modeling/error.h"
-#include "modeling/parallel.h"
-#include "render/exr_io.h"
-#include "render/image_file.h"
+#include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/image_file.h"
 
 namespace nephele::apps {
 namespace {

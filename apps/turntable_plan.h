@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "apps/object_options.h"
-#include "apps/render_options.h"
-#include "render/frame_range.h"
-#include "render/movie.h"
-#include "render/turntable.h"
+#include "apps/options/object_options.h"
+#include "apps/options/render_options.h"
+#include "nephele/render/image/frame_range.h"
+#include "nephele/render/image/movie.h"
+#include "nephele/render/scene/turntable.h"
 
 namespace nephele::apps {
 

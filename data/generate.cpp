@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "levelset/brick_grid.h"
-#include "levelset/marching_cubes.h"
-#include "levelset/mesh_io.h"
-#include "modeling/mesh.h"
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/base/mesh.h"
 
 namespace {
 

@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "levelset/advection_files.h"
-#include "levelset/grid_field.h"
+#include "nephele/levelset/flow/advection_files.h"
+#include "nephele/levelset/grid/grid_field.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "levelset/advection_files.h"
-#include "levelset/grid_field.h"
-#include "levelset/mesh_io.h"
-#include "levelset/vdb_io.h"
-#include "modeling/function_field.h"
-#include "modeling/shapes.h"
+#include "nephele/levelset/flow/advection_files.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/field/function_field.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "tests/support/run_program.h"
 
 namespace nephele::test {

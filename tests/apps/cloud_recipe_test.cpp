@@ -5,9 +5,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "levelset/grid_field.h"
-#include "levelset/mesh_io.h"
-#include "levelset/vdb_io.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"
 
 namespace nephele::test {

@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "levelset/mesh_distance.h"
-#include "levelset/mesh_io.h"
-#include "levelset/mesh_pieces.h"
-#include "levelset/mesh_to_level_set.h"
-#include "levelset/vdb_io.h"
-#include "render/exr_io.h"
+#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/render/image/exr_io.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"

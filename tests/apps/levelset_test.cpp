@@ -3,8 +3,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "levelset/mesh_io.h"
-#include "levelset/vdb_io.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"

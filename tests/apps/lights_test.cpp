@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "levelset/vdb_io.h"
-#include "render/exr_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/render/image/exr_io.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 

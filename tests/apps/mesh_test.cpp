@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "levelset/mesh_io.h"
+#include "nephele/levelset/io/mesh_io.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"

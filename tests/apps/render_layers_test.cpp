@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "levelset/vdb_io.h"
-#include "render/deep_image.h"
-#include "render/exr_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/render/image/deep_image.h"
+#include "nephele/render/image/exr_io.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 

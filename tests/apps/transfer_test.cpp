@@ -4,11 +4,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "levelset/mesh_io.h"
-#include "levelset/mesh_repair.h"
-#include "levelset/vdb_io.h"
-#include "render/exr_io.h"
-#include "render/png_io.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/png_io.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "levelset/point_io.h"
-#include "levelset/vdb_io.h"
+#include "nephele/levelset/io/point_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 

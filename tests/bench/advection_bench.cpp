@@ -7,13 +7,13 @@
 #include <memory>
 #include <vector>
 
-#include "levelset/advection.h"
-#include "levelset/grid_field.h"
-#include "modeling/field_ops.h"
-#include "modeling/noises.h"
-#include "modeling/parallel.h"
-#include "modeling/shapes.h"
-#include "modeling/space.h"
+#include "nephele/levelset/flow/advection.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele {
 namespace {

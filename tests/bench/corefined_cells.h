@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "modeling/mesh.h"
+#include "nephele/modeling/base/mesh.h"
 
 namespace nephele {
 

@@ -3,12 +3,12 @@
 
 #include <random>
 
-#include "levelset/cloud_density.h"
-#include "levelset/cumulo_grids.h"
-#include "levelset/grid_field.h"
-#include "modeling/density_profile.h"
-#include "modeling/field_ops.h"
-#include "modeling/shapes.h"
+#include "nephele/levelset/cloud/cloud_density.h"
+#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/modeling/cloud/density_profile.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele {
 namespace {

@@ -10,10 +10,10 @@
 
 #include <cmath>
 
-#include "levelset/dot_volume.h"
-#include "levelset/wisp_volume.h"
-#include "modeling/parallel.h"
-#include "modeling/random_stream.h"
+#include "nephele/levelset/cloud/dot_volume.h"
+#include "nephele/levelset/cloud/wisp_volume.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/random_stream.h"
 
 namespace nephele {
 namespace {

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "modeling/field_ops.h"
-#include "modeling/shapes.h"
-#include "modeling/space.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele {
 namespace {

@@ -9,12 +9,12 @@
 #include <ctime>
 #include <string>
 
-#include "modeling/field_ops.h"
-#include "modeling/noise.h"
-#include "modeling/shapes.h"
-#include "modeling/space.h"
-#include "render/field_volume.h"
-#include "render/raymarch.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+#include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/shape/shapes.h"
+#include "nephele/render/march/raymarch.h"
+#include "nephele/render/volume/field_volume.h"
 
 namespace nephele {
 namespace {

@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "levelset/vdb_io.h"
-#include "modeling/error.h"
-#include "render/exr_io.h"
-#include "render/path_trace.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/march/path_trace.h"
 
 namespace nephele {
 namespace {

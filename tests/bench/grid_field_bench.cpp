@@ -9,12 +9,12 @@
 
 #include <random>
 
-#include "levelset/attribute_field.h"
-#include "levelset/grid_field.h"
-#include "levelset/grid_kernels.h"
-#include "modeling/field_ops.h"
-#include "modeling/noise.h"
-#include "modeling/shapes.h"
+#include "nephele/levelset/cloud/attribute_field.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/grid_kernels.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "tests/support/test_meshes.h"
 
 namespace nephele {

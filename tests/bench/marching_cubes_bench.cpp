@@ -5,11 +5,11 @@
 #include <map>
 #include <memory>
 
-#include "levelset/grid_field.h"
-#include "levelset/marching_cubes.h"
-#include "modeling/field_ops.h"
-#include "modeling/noise.h"
-#include "modeling/shapes.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace {
 

@@ -11,14 +11,14 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "levelset/mesh_io.h"
-#include "levelset/mesh_warp.h"
-#include "levelset/transfer_attributes.h"
-#include "levelset/transfer_quality.h"
-#include "levelset/warp_grid.h"
-#include "modeling/error.h"
-#include "modeling/field_ops.h"
-#include "modeling/parallel.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/warp/mesh_warp.h"
+#include "nephele/levelset/warp/transfer_attributes.h"
+#include "nephele/levelset/warp/transfer_quality.h"
+#include "nephele/levelset/warp/warp_grid.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/field/operations.h"
 #include "tests/support/uv_layout.h"
 
 namespace {

@@ -2,13 +2,13 @@
 // points, alignment, relaxation, and the warp field on a grid.
 #include <benchmark/benchmark.h>
 
-#include "levelset/alignment.h"
-#include "levelset/exact_distance.h"
-#include "levelset/grid_field.h"
-#include "levelset/marching_cubes.h"
-#include "levelset/mesh_warp.h"
-#include "modeling/parallel.h"
-#include "modeling/shapes.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/mesh/exact_distance.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/warp/alignment.h"
+#include "nephele/levelset/warp/mesh_warp.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "tests/support/linked_tori.h"
 
 namespace nephele {

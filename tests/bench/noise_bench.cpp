@@ -9,11 +9,11 @@
 #include <random>
 #include <vector>
 
-#include "modeling/lattice_noise.h"
-#include "modeling/noise.h"
-#include "modeling/noise_kernels.h"
-#include "modeling/noises.h"
-#include "modeling/spectral_noise.h"
+#include "nephele/modeling/noise/detail/noise_kernels.h"
+#include "nephele/modeling/noise/detail/spectral_noise.h"
+#include "nephele/modeling/noise/lattice_noise.h"
+#include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/noise/noises.h"
 
 namespace nephele {
 namespace {

@@ -11,13 +11,13 @@
 #include <ctime>
 #include <filesystem>
 
-#include "levelset/grid_field.h"
-#include "levelset/level_set_pieces.h"
-#include "levelset/marching_cubes.h"
-#include "levelset/mesh_io.h"
-#include "levelset/mesh_pieces.h"
-#include "levelset/mesh_to_level_set.h"
-#include "levelset/pieces.h"
+#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "tests/bench/corefined_cells.h"
 #include "tests/support/test_meshes.h"
 

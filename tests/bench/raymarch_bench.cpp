@@ -6,9 +6,9 @@
 #include <cmath>
 #include <memory>
 
-#include "render/light_volume.h"
-#include "render/march_kernels.h"
-#include "render/raymarch.h"
+#include "nephele/render/light/light_volume.h"
+#include "nephele/render/march/march_kernels.h"
+#include "nephele/render/march/raymarch.h"
 #include "tests/support/density.h"
 #include "tests/support/march_scene.h"
 

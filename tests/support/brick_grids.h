@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "levelset/brick_grid.h"
-#include "modeling/function_field.h"
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/modeling/field/function_field.h"
 
 namespace nephele::test {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "modeling/constant_node.h"
-#include "modeling/field.h"
+#include "nephele/modeling/field/constant_node.h"
+#include "nephele/modeling/field/field.h"
 
 namespace nephele::test {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 
-#include "levelset/brick_grid.h"
+#include "nephele/levelset/grid/brick_grid.h"
 
 namespace nephele::test {
 

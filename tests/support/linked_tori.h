@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modeling/combine.h"
-#include "modeling/shapes.h"
+#include "nephele/modeling/shape/combinations.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::test {
 

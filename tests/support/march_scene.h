@@ -1,8 +1,8 @@
 #pragma once
 
-#include "render/light_volume.h"
-#include "render/march_scene.h"
-#include "render/render_volume.h"
+#include "nephele/render/light/light_volume.h"
+#include "nephele/render/volume/march_scene.h"
+#include "nephele/render/volume/render_volume.h"
 
 namespace nephele::test {
 

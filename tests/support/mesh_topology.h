@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "modeling/mesh.h"
+#include "nephele/modeling/base/mesh.h"
 
 namespace nephele::test {
 

@@ -7,8 +7,8 @@
 #include <random>
 #include <string>
 
-#include "levelset/mesh_pieces.h"
-#include "modeling/error.h"
+#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_topology.h"
 
 namespace nephele::test {

@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "modeling/mesh.h"
+#include "nephele/modeling/base/mesh.h"
 
 namespace nephele::test {
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "modeling/mesh.h"
+#include "nephele/modeling/base/mesh.h"
 
 namespace nephele::test {
 

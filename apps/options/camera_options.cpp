@@ -1,0 +1,274 @@
+#include "apps/options/camera_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nephele/render/scene/camera_file.h"
+
+namespace nephele::apps {
+namespace {
+
+constexpr double kAny = std::numeric_limits<double>::max();
+// Poses of a moving camera while its shutter is open: a turn of half a circle is still in steps of 11
+// degrees.
+constexpr int kPoses = 17;
+
+void addPicture(CLI::App& app, CameraOptions& options) {
+  addSize(app, "--size", options.frame.width, options.frame.height, "Pixels across and down.");
+  app.add_option_function<std::string>(
+         "--crop",
+         [&options](const std::string& text) {
+           const std::string form =
+               "X0,Y0,X1,Y1 in whole pixels from the upper left corner, X0 < X1, Y0 < Y1";
+           const std::vector<double> n = parseNumbers("--crop", text, form);
+           bool fits = n.size() == 4;
+           for (const double number : n)
+             fits = fits && number >= 0 && number <= 65536 && number == std::floor(number);
+           if (!fits || n[0] >= n[2] || n[1] >= n[3]) refuseValue("--crop", text, form);
+           options.frame.crop = PixelBox{int(n[0]), int(n[1]), int(n[2]), int(n[3])};
+         },
+         "Make only these pixels of the picture, X1 and Y1 not included; the EXR says where they belong.")
+      ->type_name("X0,Y0,X1,Y1");
+}
+
+void addPlace(CLI::App& app, CameraOptions& options) {
+  CLI::Option* view =
+      addNumbers(
+          app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360, [&options](const Vec3f& v) { options.view = v; },
+          "Where the camera stands, in degrees, at the distance that frames the volume: azimuth from the "
+          "front (+z) towards +x, elevation from the horizon.")
+          ->default_str(fmt::format("{:g},{:g}", options.view.x, options.view.y));
+  CLI::Option* position =
+      addNumbers(
+          app, "--camera-position", "X,Y,Z", 3, -kAny, kAny,
+          [&options](const Vec3f& v) { options.position = v; }, "Where the camera stands.")
+          ->excludes(view);
+  addNumbers(
+      app, "--look-at", "X,Y,Z", 3, -kAny, kAny, [&options](const Vec3f& v) { options.lookAt = v; },
+      "What it looks at; default: the middle of the volume.")
+      ->needs(position);
+  addVec3(app, "--up", options.up, "What is up in the picture.")->needs(position);
+  CLI::Option* file =
+      app.add_option("--camera", options.file, "Animated camera: .chan (Nuke, Houdini) or .json.")
+          ->type_name("FILE")
+          ->excludes(view)
+          ->excludes(position);
+  app.add_option_function<std::string>(
+         "--rotation-order",
+         [&options](const std::string& text) {
+           try {
+             options.rotationOrder = RotationOrder::parse(text);
+           } catch (const Error&) {
+             refuseValue("--rotation-order", text, "XYZ, XZY, YXZ, YZX, ZXY or ZYX");
+           }
+         },
+         "Order in which the angles of a .chan turn; ZXY is Nuke's, XYZ Houdini's.")
+      ->type_name("ORDER")
+      ->default_str(options.rotationOrder.name())
+      ->needs(file);
+  addOptional(app, "--frame", options.frameNumber, -1e9, 1e9, "Frame of --camera; default: its first.")
+      ->needs(file);
+}
+
+void addLens(CLI::App& app, CameraOptions& options) {
+  CLI::Option* fov =
+      addOptional(app, "--fov", options.fovDegrees, 0.1, 170, "Horizontal angle of view in degrees.")
+          ->default_str(fmt::format("{:g}", options.frame.fovDegrees));
+  addOptional(app, "--focal-length", options.focalLength, 0.1, 1e5,
+              "Focal length in millimetres, instead of --fov.")
+      ->excludes(fov);
+  addNumber(app, "--film-width", options.filmWidth, 0.1, 1e5, "Width of the film in millimetres.");
+  addChoice<Camera::Projection>(
+      app, "--projection", options.frame.projection,
+      {{"perspective", Camera::Projection::perspective}, {"orthographic", Camera::Projection::orthographic}},
+      "How space becomes a picture.");
+  addOptional(app, "--orthographic-width", options.orthographicWidth, 1e-9, 1e12,
+              "Width of an orthographic picture in world units; default: what shows the volume.");
+  CLI::Option* fStop =
+      addOptional(app, "--f-stop", options.fStop, 0.01, 1e6,
+                  "Depth of field of a lens whose diameter is its focal length / this, where "
+                  "world units are metres.");
+  addOptional(app, "--lens-radius", options.lensRadius, 0, 1e12,
+              "Depth of field of a lens with this radius in world units.")
+      ->excludes(fStop);
+  addOptional(app, "--focus-distance", options.focusDistance, 1e-9, 1e12,
+              "What is sharp, in world units along the line of sight; default: the middle of the volume.");
+}
+
+void addTime(CLI::App& app, CameraOptions& options) {
+  app.add_option_function<std::string>(
+         "--shutter",
+         [&options](const std::string& text) {
+           const std::string form = "OPEN,CLOSE in frames, each -100 to 100, OPEN not after CLOSE";
+           const std::vector<double> n = parseNumbers("--shutter", text, form);
+           if (n.size() != 2 || n[0] > n[1] || n[0] < -100 || n[1] > 100)
+             refuseValue("--shutter", text, form);
+           options.shutter = {n[0], n[1]};
+         },
+         "When the shutter opens and closes, in frames from the frame: -0.25,0.25 is the usual blur, 0,0 "
+         "none.")
+      ->type_name("OPEN,CLOSE")
+      ->default_str("0,0");
+  app.add_option_function<std::string>(
+         "--volume-motion",
+         [&options](const std::string& text) {
+           const std::string form = "DX,DY,DZ[,RX,RY,RZ]: world units and degrees per frame";
+           const std::vector<double> n = parseNumbers("--volume-motion", text, form);
+           if (n.size() != 3 && n.size() != 6) refuseValue("--volume-motion", text, form);
+           options.volumeMotion = RigidMotion{{n[0], n[1], n[2]}, {}, {}};
+           if (n.size() == 6) options.volumeMotion->spinDegrees = {n[3], n[4], n[5]};
+         },
+         "How the volume moves per frame, for --shutter: world units, and degrees of a turn about the axis "
+         "RX,RY,RZ through its middle, as many as the axis is long.")
+      ->type_name("DX,DY,DZ[,RX,RY,RZ]");
+}
+
+Vec3f middleOf(const RenderVolume& volume) {
+  return volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
+}
+
+// Of an orthographic picture that shows all of `volume` to a camera like `camera`, with a margin of 4 %.
+float widthFor(const RenderVolume& volume, const Camera& camera) {
+  double half = 0;
+  const double pixels = camera.width() / camera.screenWidth();
+  for (const Vec3f& point : volume.outline()) {
+    const Vec3d p = camera.project(Vec3d(point));
+    half = std::max({half, std::fabs(p.x - 0.5 * camera.width()) / pixels,
+                     std::fabs(p.y - 0.5 * camera.height()) / pixels * camera.width() / camera.height()});
+  }
+  return half > 0 ? float(2 * half / 0.92) : 1.0f;
+}
+
+// The options and a key of a file, put together.
+class Placement {
+ public:
+  Placement(const CameraOptions& options, const RenderVolume& volume) : options_(options), volume_(volume) {}
+
+  Camera camera(const CameraKey& key) {
+    const Camera::Frame frame = frameOf(key);
+    const Vec3d right = key.rotation({1, 0, 0}), up = key.rotation({0, 1, 0});
+    return withLens(
+        fitted(frame, [&](const Camera::Frame& f) { return Camera::facing(key.position, right, up, f); }),
+        frame, key);
+  }
+
+  Camera camera() {
+    const Camera::Frame frame = frameOf({});
+    if (!options_.position) {
+      const std::vector<Vec3f>& framed = options_.framed.empty() ? volume_.outline() : options_.framed;
+      return withLens(Camera::framing(framed, options_.view.x, options_.view.y, frame), frame, {});
+    }
+    return withLens(fitted(frame,
+                           [&](const Camera::Frame& f) {
+                             return Camera::lookingAt(*options_.position,
+                                                      options_.lookAt.value_or(middleOf(volume_)),
+                                                      options_.up, f);
+                           }),
+                    frame, {});
+  }
+
+ private:
+  Camera::Frame frameOf(const CameraKey& key) const {
+    Camera::Frame frame = options_.frame;
+    if (options_.fovDegrees)
+      frame.fovDegrees = float(*options_.fovDegrees);
+    else if (options_.focalLength)
+      frame.fovDegrees = float(fovDegreesOf(*options_.focalLength, options_.filmWidth));
+    else if (key.fovDegrees)
+      frame.fovDegrees = float(*key.fovDegrees);
+    else if (key.verticalFovDegrees)
+      frame.fovDegrees =
+          float(fovDegreesOf(focalLengthOf(*key.verticalFovDegrees, frame.height), frame.width));
+    const std::optional<double> width =
+        options_.orthographicWidth ? options_.orthographicWidth : key.orthographicWidth;
+    if (width) frame.orthographicWidth = float(*width);
+    return frame;
+  }
+
+  // A camera that does not frame anything needs a width; all of a moving one's poses have the same.
+  template <class Make>
+  Camera fitted(Camera::Frame frame, const Make& make) {
+    const bool parallel = frame.projection == Camera::Projection::orthographic;
+    if (parallel && !frame.orthographicWidth) {
+      frame.orthographicWidth = width_.value_or(1.0f);
+      if (!width_) frame.orthographicWidth = width_ = widthFor(volume_, make(frame));
+    }
+    return make(frame);
+  }
+
+  Camera withLens(const Camera& camera, const Camera::Frame& frame, const CameraKey& key) const {
+    const bool fromOptions = options_.fStop || options_.lensRadius;
+    const std::optional<double> fStop = fromOptions ? options_.fStop : key.fStop;
+    double radius = (fromOptions ? options_.lensRadius : key.lensRadius).value_or(0);
+    if (fStop) {
+      if (camera.isOrthographic())
+        throw CLI::ValidationError("--f-stop",
+                                   "an orthographic camera has no focal length; give --lens-radius");
+      radius = 1e-3 * focalLengthOf(double(frame.fovDegrees), options_.filmWidth) / (2 * *fStop);
+    }
+    if (radius == 0) return camera;
+    const std::optional<double> focus = options_.focusDistance ? options_.focusDistance : key.focusDistance;
+    const double distance = focus ? *focus : camera.project(Vec3d(middleOf(volume_))).z;
+    if (!(distance > 0))
+      throw CLI::ValidationError("--focus-distance",
+                                 "the middle of the volume is not in front of the camera, so "
+                                 "that there must be one");
+    return camera.withLens({radius, distance});
+  }
+
+  const CameraOptions& options_;
+  const RenderVolume& volume_;
+  std::optional<float> width_;
+};
+
+}  // namespace
+
+void addCameraOptions(CLI::App& app, CameraOptions& options) {
+  addPicture(app, options);
+  addPlace(app, options);
+  addLens(app, options);
+  addTime(app, options);
+}
+
+std::optional<Camera> CameraOptions::laterCamera(const RenderVolume& volume, double frames) const {
+  if (file.empty()) return std::nullopt;
+  return camera(volume, frames);
+}
+
+Camera CameraOptions::camera(const RenderVolume& volume, double framesLater) const {
+  if (const auto& c = frame.crop; c && (c->x1 > frame.width || c->y1 > frame.height))
+    refuseValue("--crop", fmt::format("{},{},{},{}", c->x0, c->y0, c->x1, c->y1),
+                fmt::format("within the picture, 0,0,{},{}", frame.width, frame.height));
+  if (!shutter.isInstant() && file.empty() && !volumeMotion && !volumeFlows)
+    throw CLI::ValidationError("--shutter",
+                               "nothing moves; give --camera, --volume-motion or --velocity-grid");
+  if (volumeMotion && shutter.isInstant())
+    throw CLI::ValidationError("--volume-motion", "shows only while the shutter is open; give --shutter");
+  Placement placement(*this, volume);
+  if (file.empty()) return placement.camera();
+
+  const CameraMotion motion = readCameraFile(file, rotationOrder);
+  const double now = frameNumber.value_or(motion.firstFrame());
+  if (now < motion.firstFrame() || now > motion.lastFrame())
+    refuseValue("--frame", fmt::format("{:g}", now),
+                fmt::format("{:g} to {:g}, which {} holds", motion.firstFrame(), motion.lastFrame(), file));
+  if (framesLater != 0) return placement.camera(motion.at(now + framesLater));
+  const Camera camera = placement.camera(motion.at(now));
+  std::vector<Camera> poses;
+  for (int i = 0; !shutter.isInstant() && i != kPoses; ++i)
+    poses.push_back(
+        placement.camera(motion.at(now + shutter.open + (shutter.close - shutter.open) * i / (kPoses - 1))));
+  return camera.withShutter(poses);
+}
+
+std::optional<RigidMotion> CameraOptions::motionOf(const RenderVolume& volume) const {
+  if (!volumeMotion || shutter.isInstant()) return std::nullopt;
+  RigidMotion motion = *volumeMotion;
+  motion.centre = Vec3d(middleOf(volume));
+  return motion;
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,117 @@
+#include "apps/options/cloud_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/modeling/field/operations.h"
+
+namespace nephele::apps {
+
+double CloudArguments::voxel(double longestSide) const {
+  return voxelSize.value > 0 ? voxelSize.worldUnits(longestSide) : longestSide / resolution;
+}
+
+int CloudArguments::layerCount() const {
+  return recipe.empty() || layersOption->count() > 0 ? fractal.layers : int(recipe.size());
+}
+
+FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
+  // Few bumps rise above twice their rms; farther out look-ups are slower, not wrong.
+  constexpr double kHighest = 2;
+  const double longestSide = boundingBox(mesh).longestSide();
+  double rms = 0;
+  for (int i = 0; i < layerCount(); ++i) {
+    const bool hasOwn = std::size_t(i) < recipe.size() && recipe[std::size_t(i)].amplitude;
+    const FieldValue& given = hasOwn ? *recipe[std::size_t(i)].amplitude : amplitude;
+    rms += given.largestInWorldUnits(longestSide) *
+           (hasOwn ? 1 : std::pow(roughness.largestInWorldUnits(longestSide), i));
+  }
+  return {mesh,
+          {.voxelSize = voxel(longestSide),
+           .reach = std::min(kHighest * rms, longestSide) + edgeThickness.largestInWorldUnits(longestSide)},
+          run};
+}
+
+CloudOptions CloudArguments::resolved(FieldSources& sources) const {
+  CloudOptions result = cloud;
+  result.voxelSize = float(sources.voxelSize());
+  CumuloFractal form = fractal;
+  form.layers = layerCount();
+  if (noiseTime) form.noise.time = float(*noiseTime);
+  if (noisePeriod) form.noise.period = float(*noisePeriod);
+  form.amplitude = sources.field(amplitude);
+  form.frequency = sources.field(frequency);
+  form.lacunarity = sources.field(lacunarity);
+  form.roughness = sources.field(roughness);
+  form.billow = sources.field(billow);
+  form.billowScale = sources.field(billowScale);
+  form.seed = std::uint32_t(seed);
+  result.layers = recipeLayers(recipe, form, sources);
+  result.edgeThickness = sources.field(edgeThickness);
+  result.edgeExponent = density.edgeExponent;
+  result.densityFactor = density.factor(sources, shape.isGenerated(), form.seed);
+  result.withSurface = !surface.empty();
+  return result;
+}
+
+std::string CloudArguments::noiseOf(std::size_t index) const {
+  const LayerRecipe own = index < recipe.size() ? recipe[index] : LayerRecipe{};
+  const std::string kind(noiseName(own.noise.value_or(fractal.noise.kind)));
+  return own.octaves > 1 ? fmt::format("{}, {} octaves", kind, own.octaves) : kind;
+}
+
+namespace {
+
+void addLayerOptions(CLI::App& app, CloudArguments& a) {
+  a.layersOption =
+      addCount(app, "--layers", a.fractal.layers, 1, kMaxCumuloLayers, "Layers of displacement.");
+  addFieldValue(app, "--amplitude", a.amplitude, "Rms height of the first layer's bumps.");
+  addFieldValue(app, "--frequency", a.frequency, "Frequency of the first layer's bumps.");
+  addFieldValue(app, "--lacunarity", a.lacunarity, "Frequency of a layer, in that of the one before.");
+  addFieldValue(app, "--roughness", a.roughness, "Height of a layer, in that of the one before.");
+  addFieldValue(app, "--billow", a.billow, "How clear valleys are kept of smaller bumps; 0: not at all.");
+  addFieldValue(app, "--billow-scale", a.billowScale, "Height, in rms heights, from which bumps are full.");
+  std::vector<std::pair<std::string, NoiseKind>> kinds;
+  for (const NoiseKind kind : noiseKinds()) kinds.emplace_back(noiseName(kind), kind);
+  addChoice<NoiseKind>(app, "--noise", a.fractal.noise.kind, kinds, "Noise of the layers.");
+  auto* time = addOptional(app, "--noise-time", a.noiseTime, -1e6, 1e6,
+                           "Set the noise in motion, and take it at this time: another after about 1.");
+  addOptional(app, "--noise-period", a.noisePeriod, 1e-3, 1e6,
+              "Time after which the moving noise is the same again.")
+      ->needs(time);
+  app.add_option_function<std::string>(
+         "--recipe", [&a](const std::string& path) { a.recipe = readLayerRecipe(path); },
+         "TOML file with a [[layer]] for each layer; what it leaves open follows the options above.")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
+void addCloudOptions(CLI::App& app, CloudArguments& a) {
+  using Renormalise = CumuloGridOptions::Renormalise;
+  addShapeOptions(app, a.shape);
+  addOutput(app, "-o,--output", a.output, {".vdb"}, "Volume to write; its grid is called 'density'.")
+      ->required();
+  addOutput(app, "--surface", a.surface, {".vdb"},
+            "Also write the displaced level set; its grid is called 'surface'.");
+  auto* resolution =
+      addCount(app, "--resolution", a.resolution, 1, 1000000, "Voxels along the longest side of the input.");
+  addLength(app, "--voxel-size", a.voxelSize, "Edge of a voxel, instead of --resolution.", Sign::positive)
+      ->excludes(resolution);
+  addLayerOptions(app, a);
+  addChoice<Renormalise>(
+      app, "--renormalise", a.cloud.renormalise,
+      {{"off", Renormalise::off}, {"sweep", Renormalise::sweep}, {"rebuild", Renormalise::rebuild}},
+      "Turn each layer's surface back into a distance.");
+  addCount(app, "--medial-smoothing", a.cloud.medialSmoothing, 0, kMaxMedialSmoothing,
+           "Voxels by which jumps between facing parts are smoothed.");
+  addFieldValue(app, "--edge-thickness", a.edgeThickness, "Width over which density rises to 1.");
+  addDensityOptions(app, a.density);
+  addCloudAdvectionOptions(app, a.advection);
+  addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another cloud of the same kind.");
+  app.add_flag("--half", a.cloud.halfFloat, "Save 16-bit values.");
+}
+
+}  // namespace nephele::apps

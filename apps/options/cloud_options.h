@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+
+#include "apps/app.h"
+#include "apps/cloud_advection.h"
+#include "apps/options/cloud_quantities.h"
+#include "apps/options/density_options.h"
+#include "apps/options/layer_recipe.h"
+#include "apps/options/shape_options.h"
+#include "nephele/levelset/cloud/cloud.h"
+
+namespace nephele::apps {
+
+/// The options of the verb cloud as typed.
+struct CloudArguments {
+  ShapeArguments shape;
+  DensityArguments density;
+  CloudAdvectionArguments advection;
+  std::string output, surface;
+  Length voxelSize;
+  int resolution = 256, seed = 0;
+  FieldValue amplitude = parseFieldValue("--amplitude", "2.5%", kAmplitude);
+  FieldValue frequency = parseFieldValue("--frequency", "4.4x", kFrequency);
+  FieldValue lacunarity = parseFieldValue("--lacunarity", "2.1", kLacunarity);
+  FieldValue roughness = parseFieldValue("--roughness", "0.55", kRoughness);
+  FieldValue billow = parseFieldValue("--billow", "1", kBillow);
+  FieldValue billowScale = parseFieldValue("--billow-scale", "1", kBillowScale);
+  FieldValue edgeThickness = parseFieldValue("--edge-thickness", "0.35%", kEdgeThickness);
+  /// What needs no conversion: count and noise of the layers; the rest is filled in by `resolved`.
+  CumuloFractal fractal;
+  const CLI::Option* layersOption = nullptr;
+  std::optional<double> noiseTime, noisePeriod;
+  std::vector<LayerRecipe> recipe;
+  CloudOptions cloud;
+
+  /// World units, for a shape with this longest side.
+  double voxel(double longestSide) const;
+  /// As typed, else those of the recipe, else the default.
+  int layerCount() const;
+  /// What the parameters of a cloud on `mesh` are made from.
+  FieldSources sources(const Mesh& mesh, const Run& run) const;
+  /// The library's options. @throws Error naming an option whose field cannot be made.
+  CloudOptions resolved(FieldSources& sources) const;
+  /// What noise layer `index` has: "worley, 3 octaves".
+  std::string noiseOf(std::size_t index) const;
+};
+
+/// Declares the options on `app`.
+void addCloudOptions(CLI::App& app, CloudArguments& arguments);
+
+}  // namespace nephele::apps

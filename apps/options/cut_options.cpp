@@ -1,0 +1,74 @@
+#include "apps/options/cut_options.h"
+
+#include "apps/options/cut_quantities.h"
+
+namespace nephele::apps {
+namespace {
+
+void addPicture(CLI::App& app, CutArguments& a) {
+  auto* preview = addOutput(app, "--preview", a.preview, {".png"},
+                            "Picture of the pieces, moved apart, each in a colour of its own.");
+  addPreviewFrame(app, preview, a.picture.width, a.picture.height, a.picture.azimuthDegrees,
+                  a.picture.elevationDegrees);
+}
+
+}  // namespace
+
+void addCutOptions(CLI::App& app, CutArguments& a) {
+  app.add_option("input", a.input, "Mesh or level set (.vdb) to cut, or a folder of pieces to cut again.")
+      ->required()
+      ->type_name("FILE");
+  app.add_option("-o,--output", a.folder, "Folder for the pieces.")->required()->type_name("FOLDER");
+
+  addPlanes(app, a.planes);
+  auto* random =
+      addCount(app, "--random-planes", a.randomPlanes, 1, 1000000, "Cut by this many random planes.")
+          ->default_str("");
+  app.add_flag("--through-centre", a.throughCentre, "Random planes all pass through the middle of the box.")
+      ->needs(random);
+  auto* roughness = addLength(app, "--roughness", a.roughness,
+                              "Roughen all planes, as fracture does: root mean square height.");
+  addFrequency(app, "--roughness-frequency", a.roughnessFrequency,
+               "Hills of the largest size: cycles per world unit, or per longest side (5x).")
+      ->needs(roughness);
+  addCount(app, "--roughness-octaves", a.octaves, 1, 12,
+           "Sizes of hills: each half as large and half as high as the one before.")
+      ->needs(roughness);
+  app.add_option("--knife", a.knifeFiles,
+                 "Cut by the surface of a closed mesh or a level set (.vdb); may be given again.")
+      ->type_name("FILE")
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  auto* voronoi = addCount(app, "--voronoi", a.cellCount, 1, 1000000,
+                           "Cut into the Voronoi cells of this many points, scattered inside.")
+                      ->default_str("");
+  app.add_option("--points", a.points, "Cut into the Voronoi cells of these points (.ply, .obj, .txt, .csv).")
+      ->type_name("FILE")
+      ->excludes(voronoi);
+  addLength(app, "--kerf", a.kerf, "Width of the cuts: half of it goes from either side.");
+  addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another set of planes, hills and points.");
+
+  using Geometry = CutArguments::Geometry;
+  addChoice<Geometry>(app, "--geometry", a.geometry,
+                      {{"exact", Geometry::exact}, {"levelset", Geometry::levelset}},
+                      "Cut the mesh itself, or its level set, which bevels rims by less than a voxel.");
+  auto* resolution = addCount(app, "--resolution", a.resolution, 8, 1000000,
+                              "Voxels along the longest side, where level sets are made.")
+                         ->default_str("256, or those of a level set");
+  a.resolutionOption = resolution;
+  addLength(app, "--voxel-size", a.voxelSize, "Edge of a voxel, instead of --resolution.", Sign::positive)
+      ->excludes(resolution);
+  addVolume(app, a.minVolume);
+  addRepair(app, a.repair.mode);
+
+  using Format = PieceFilesOptions::Format;
+  addChoice<Format>(app, "--format", a.format, {{"obj", Format::obj}, {"ply", Format::ply}},
+                    "Of the pieces' meshes; PLY has no groups.");
+  app.add_flag("--vdb", a.levelSets, "Also write pieces.vdb, a level set of each piece.");
+  addOptional(
+      app, "--explode", a.explode, 0, 1000,
+      "Also write exploded.obj: pieces moved apart, by this share of their distance from the middle.");
+  addPicture(app, a);
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/app.h"
+#include "nephele/levelset/cut/piece_files.h"
+#include "nephele/render/preview/pieces_picture.h"
+
+namespace nephele::apps {
+
+struct CutKnives;
+
+/// The options of the verb cut as typed.
+struct CutArguments {
+  enum class Geometry { exact, levelset };
+
+  std::string input, folder, points, preview;
+  std::vector<BladePlane> planes;
+  int randomPlanes = 0, cellCount = 0, seed = 0, resolution = 256, octaves = 4;
+  bool throughCentre = false, levelSets = false;
+  Length roughness, kerf, voxelSize;
+  Frequency roughnessFrequency{5, true};
+  std::vector<std::string> knifeFiles;
+  std::optional<double> explode;
+  /// Volume, or a share of the whole in percent.
+  Length minVolume;
+  Geometry geometry = Geometry::exact;
+  PieceFilesOptions::Format format = PieceFilesOptions::Format::obj;
+  MeshRepairOptions repair;
+  PiecesPictureOptions picture;
+  const CLI::Option* resolutionOption = nullptr;
+
+  /// What is to be cut, whole and closed, with level sets if these are to be cut.
+  /// @throws Error naming the file.
+  std::vector<CutPart> readParts(Run& run) const;
+  /// The input is one mesh, not a volume or pieces.
+  bool isModel() const;
+  /// What is written of the pieces.
+  PieceFilesOptions files(const CutKnives& knives, const Run& run) const;
+};
+
+/// The knives that the arguments ask for, for parts that are there.
+struct CutKnives {
+  MeshCutOptions exact;
+  /// For pieces.json and messages, in the order of the codes.
+  std::vector<std::string> names;
+  double voxelSize = 0;
+
+  /// The same knives for level sets. @throws Error where a mesh cannot be one.
+  CutOptions forLevelSets(const Progress& progress) const;
+};
+
+/// @throws CLI::ValidationError if there is no knife, Error naming a file.
+CutKnives knivesOf(const CutArguments& arguments, const std::vector<CutPart>& parts, Run& run);
+
+/// Declares the options on `app`.
+void addCutOptions(CLI::App& app, CutArguments& arguments);
+
+}  // namespace nephele::apps

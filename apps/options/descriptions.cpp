@@ -1,0 +1,96 @@
+#include "apps/options/descriptions.h"
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/render/image/exr_io.h"
+
+namespace nephele::apps {
+namespace {
+
+constexpr std::size_t kMostTriangles = 500000;
+
+/// The extension in capitals, without its dot.
+std::string formatOf(const std::string& path) {
+  std::string format = std::filesystem::path(path).extension().string();
+  for (char& c : format) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  return format.substr(format.empty() ? 0 : 1);
+}
+
+Description list(const auto& p) {
+  return {p.x, p.y, p.z};
+}
+
+Description meshDescription(const std::string& path, bool alwaysCountPairs) {
+  const Mesh mesh = readMesh(path);
+  const MeshDiagnosis is = diagnose(mesh);
+  Description d{{"kind", "mesh"},
+                {"format", formatOf(path)},
+                {"vertices", is.vertices},
+                {"faces", is.faces},
+                {"triangles", is.triangles}};
+  d["components"] = is.components;
+  d["box_min"] = list(is.box.min);
+  d["box_max"] = list(is.box.max);
+  d["area"] = is.area;
+  if (is.closed()) d["volume"] = is.volume;
+  d["closed"] = is.closed();
+  d["manifold"] = is.manifold();
+  d["euler_characteristic"] = is.eulerCharacteristic;
+  if (is.manifold()) d["genus"] = is.genus();
+  for (const MeshAttribute& a : mesh.attributes) {
+    const char* domain = a.domain == MeshAttribute::Domain::corner ? "corner" : "vertex";
+    d["attributes"].push_back({{"name", a.name}, {"width", a.width}, {"domain", domain}});
+  }
+  for (const MeshGroup& g : mesh.groups) d["groups"].push_back({{"name", g.name}, {"faces", g.faceCount}});
+  d["merged_vertices"] = is.mergedVertices;
+  if (alwaysCountPairs || is.triangles <= kMostTriangles)
+    d["self_intersections"] = countSelfIntersections(mesh);
+  d["problems"] = is.problems();
+  return d;
+}
+
+Description volumeDescription(const std::string& path) {
+  static constexpr const char* kClasses[] = {"unknown", "level set", "fog volume", "staggered"};
+  Description d{{"kind", "volume"}, {"grids", Description::array()}};
+  for (const VdbGrid& grid : readVdbFile(path)) {
+    const VdbGridInfo g = describe(grid);
+    const bool isEmpty = g.activeVoxels == 0;
+    d["grids"].push_back({{"name", g.name},
+                          {"type", g.type},
+                          {"class", kClasses[static_cast<int>(g.gridClass)]},
+                          {"active_voxels", g.activeVoxels},
+                          {"size", list(isEmpty ? Vec3i{} : g.indexMax - g.indexMin + Vec3i{1, 1, 1})},
+                          {"voxel_size", list(g.voxelSize)},
+                          {"uniform", g.uniform},
+                          {"half", g.halfFloat},
+                          {"memory_bytes", g.memoryBytes}});
+    Description& last = d["grids"].back();
+    if (g.type == "float" || g.type == "double") {
+      last["values"] = {g.valueMin, g.valueMax};
+      last["background"] = g.background;
+    }
+    last["metadata"] = g.metadata;
+  }
+  return d;
+}
+
+}  // namespace
+
+Description describeFile(const std::string& path, bool alwaysCountPairs) {
+  const std::string extension = CLI::detail::to_lower(std::filesystem::path(path).extension().string());
+  Description description;
+  if (extension == ".vdb" || extension == ".nvdb")
+    description = volumeDescription(path);
+  else if (extension == ".exr" || extension == ".png" || extension == ".hdr")
+    description = {{"kind", "image"}, {"content", describeImage(path)}};
+  else
+    description = meshDescription(path, alwaysCountPairs);
+  // Names inside files may be in any encoding, but JSON is UTF-8.
+  return Description::parse(description.dump(-1, ' ', false, Description::error_handler_t::replace));
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,253 @@
+#include "apps/options/layer_recipe.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <cmath>
+
+#include "apps/options/cloud_quantities.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/cloud/density_profile.h"
+#include "nephele/modeling/field/operations.h"
+
+namespace nephele::apps {
+namespace {
+
+/// One key of a table: says where it stands when its value is refused.
+class Entry {
+ public:
+  Entry(const std::string& path, std::string name, const toml::node& value)
+      : key(std::move(name)), path_(path), value_(value) {}
+
+  std::string place() const { return fmt::format("--recipe: {}:{}", path_, value_.source().begin.line); }
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw CLI::ValidationError(place(), fmt::format("'{}' {}", key, what));
+  }
+
+  /// Says which key was probably meant.
+  [[noreturn]] void refuseKey(const char* table, const std::vector<std::string>& keys) const {
+    std::string list;
+    for (const std::string& known : keys) list += (list.empty() ? "" : ", ") + known;
+    const std::string meant = closestWord(key, keys);
+    refuse(fmt::format("is not a key of {}{} Keys: {}", table,
+                       meant.empty() ? "." : fmt::format("; did you mean '{}'?", meant), list));
+  }
+
+  std::string text() const {
+    if (const auto text = value_.value_exact<std::string>()) return *text;
+    if (const auto whole = value_.value_exact<std::int64_t>()) return std::to_string(*whole);
+    if (const auto number = value_.value_exact<double>()) return fmt::format("{}", *number);
+    refuse("takes a text or a number");
+  }
+
+  double number(double low, double high) const {
+    const auto number = value_.value<double>();
+    if (!number || !(*number >= low && *number <= high))
+      refuse(fmt::format("takes a number from {:g} to {:g}", low, high));
+    return *number;
+  }
+
+  int count(int low, int high) const {
+    const auto whole = value_.value_exact<std::int64_t>();
+    if (!whole || *whole < low || *whole > high)
+      refuse(fmt::format("takes a whole number from {} to {}", low, high));
+    return int(*whole);
+  }
+
+  Vec3f direction() const {
+    const toml::array* list = value_.as_array();
+    Vec3f v{};
+    bool fits = list && list->size() == 3;
+    for (int i = 0; fits && i < 3; ++i) {
+      const auto number = (*list)[std::size_t(i)].value<double>();
+      fits = number && std::isfinite(*number) && std::abs(*number) < 1e15;
+      if (fits) (i == 0 ? v.x : i == 1 ? v.y : v.z) = float(*number);
+    }
+    if (!fits || !(length(v) > 0)) refuse("takes a direction [X, Y, Z] that is not 0");
+    return v / length(v);
+  }
+
+  NoiseKind kind() const {
+    try {
+      return noiseKindOf(text());
+    } catch (const Error&) {
+      refuse(fmt::format("got '{}', allowed: one of {}", text(), noiseNames()));
+    }
+  }
+
+  FieldValue field(const Quantity& quantity) const {
+    return parseFieldValue(fmt::format("{}: {}", place(), key), text(), quantity);
+  }
+
+  /// A field of numbers from 0 to 1; a file alone is a mask.
+  FieldValue share() const {
+    const std::string typed = text();
+    const bool isFile =
+        (typed.find(".vdb") != std::string::npos || typed.find(".nvdb") != std::string::npos) &&
+        !typed.starts_with("mask:") && !typed.starts_with("attribute:");
+    return parseFieldValue(fmt::format("{}: {}", place(), key), isFile ? "mask:" + typed + ":0,1" : typed,
+                           {.low = 0, .high = 1});
+  }
+
+  const std::string key;
+  const toml::node& value() const { return value_; }
+  const std::string& path() const { return path_; }
+
+ private:
+  const std::string& path_;
+  const toml::node& value_;
+};
+
+SpectrumOptions spectrumOf(const Entry& table) {
+  const toml::table* keys = table.value().as_table();
+  if (!keys) table.refuse("takes a table: { exponent = 3.67, lowest = 0.5, highest = 4 }");
+  SpectrumOptions spectrum;
+  for (const auto& [name, value] : *keys) {
+    const Entry entry(table.path(), std::string(name.str()), value);
+    if (entry.key == "exponent")
+      spectrum.exponent = float(entry.number(-16, 16));
+    else if (entry.key == "lowest")
+      spectrum.lowest = float(entry.number(0, 1e6));
+    else if (entry.key == "highest")
+      spectrum.highest = float(entry.number(0, 1e6));
+    else if (entry.key == "tile")
+      spectrum.tile = float(entry.number(1e-6, 1e6));
+    else if (entry.key == "resolution")
+      spectrum.resolution = entry.count(16, 512);
+    else
+      entry.refuseKey("a spectrum", {"exponent", "lowest", "highest", "tile", "resolution"});
+  }
+  return spectrum;
+}
+
+void set(LayerRecipe& layer, const Entry& entry) {
+  const std::string& key = entry.key;
+  if (key == "noise") return void(layer.noise = entry.kind());
+  if (key == "spectrum") return void(layer.spectrum = spectrumOf(entry));
+  if (key == "time") return void(layer.time = float(entry.number(-1e6, 1e6)));
+  if (key == "period") return void(layer.period = float(entry.number(1e-3, 1e6)));
+  if (key == "seed") return void(layer.seed = std::uint32_t(entry.count(0, 1 << 30)));
+  if (key == "octaves") return void(layer.octaves = entry.count(1, 16));
+  if (key == "octave_lacunarity") return void(layer.octaveLacunarity = entry.number(0.1, 100));
+  if (key == "octave_roughness") return void(layer.octaveRoughness = entry.number(0, 10));
+  if (key == "amplitude") return void(layer.amplitude = entry.field(kAmplitude));
+  if (key == "frequency") return void(layer.frequency = entry.field(kFrequency));
+  if (key == "billow") return void(layer.billow = entry.field(kBillow));
+  if (key == "billow_scale") return void(layer.billowScale = entry.field(kBillowScale));
+  if (key == "mask") return void(layer.mask = entry.share());
+  if (key == "direction") return void(layer.direction = entry.direction());
+  if (key == "bias") return void(layer.bias = entry.number(0, 1));
+  entry.refuseKey("a layer",
+                  {"noise", "octaves", "octave_lacunarity", "octave_roughness", "spectrum", "time", "period",
+                   "seed", "amplitude", "frequency", "billow", "billow_scale", "mask", "direction", "bias"});
+}
+
+LayerRecipe recipeOf(const std::string& path, const toml::table& table) {
+  LayerRecipe layer;
+  layer.place = fmt::format("--recipe: {}:{}", path, table.source().begin.line);
+  for (const auto& [name, value] : table) set(layer, Entry(path, std::string(name.str()), value));
+  const auto needs = [&](const char* key, const char* other, bool isThere) {
+    if (const toml::node* value = table.get(key); value && !isThere)
+      Entry(path, key, *value).refuse(fmt::format("needs '{}' beside it", other));
+  };
+  needs("bias", "direction", layer.direction.has_value());
+  needs("period", "time", layer.time.has_value());
+  needs("octave_lacunarity", "octaves", layer.octaves > 1);
+  needs("octave_roughness", "octaves", layer.octaves > 1);
+  return layer;
+}
+
+/// Layer `index` with the noise that the recipe gives it, its heights left open.
+CumuloLayer layerOf(const LayerRecipe& recipe, int index, const CumuloFractal& fractal,
+                    FieldSources& sources) {
+  CumuloNoise own{.noise = fractal.noise,
+                  .frequency = fractal.frequency,
+                  .octaves = recipe.octaves,
+                  .octaveLacunarity = float(recipe.octaveLacunarity),
+                  .octaveRoughness = float(recipe.octaveRoughness)};
+  for (int i = 0; i < index; ++i) own.frequency = own.frequency * fractal.lacunarity;
+  own.noise.seed = recipe.seed.value_or(cumuloLayerSeed(fractal.seed, index));
+  if (recipe.frequency) own.frequency = sources.field(*recipe.frequency);
+  if (recipe.noise) own.noise.kind = *recipe.noise;
+  if (recipe.spectrum) own.noise.spectrum = *recipe.spectrum;
+  if (recipe.time) own.noise.time = recipe.time;
+  if (recipe.period) own.noise.period = recipe.period;
+  require(!recipe.spectrum || own.noise.kind == NoiseKind::spectral,
+          fmt::format("only noise = \"fft\" has a spectrum, not \"{}\"", noiseName(own.noise.kind)));
+  return cumuloLayer(own);
+}
+
+void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, FieldSources& sources,
+           CumuloLayer& layer) {
+  if (recipe.changesNoise()) {
+    CumuloLayer own = layerOf(recipe, index, fractal, sources);
+    own.amplitude = layer.amplitude;
+    own.billow = layer.billow;
+    own.billowScale = layer.billowScale;
+    layer = own;
+  }
+  if (recipe.amplitude) layer.amplitude = sources.field(*recipe.amplitude);
+  if (recipe.billow) layer.billow = sources.field(*recipe.billow);
+  if (recipe.billowScale) layer.billowScale = sources.field(*recipe.billowScale);
+  if (recipe.mask) layer.amplitude = layer.amplitude * sources.field(*recipe.mask);
+  if (recipe.direction) {
+    FieldValue growth{.source = FieldValue::Source::facing,
+                      .option = recipe.place + ": direction",
+                      .stops = {{-1, {1 - recipe.bias}}, {1, {1}}},
+                      .direction = *recipe.direction};
+    layer.amplitude = layer.amplitude * sources.field(growth);
+  }
+}
+
+}  // namespace
+
+std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
+  toml::table file;
+  try {
+    file = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    const auto line = error.source().begin.line;
+    throw CLI::ValidationError(
+        "--recipe",
+        fmt::format("{}: {}", line > 0 ? fmt::format("{}:{}", path, line) : path, error.description()));
+  }
+  std::vector<LayerRecipe> layers;
+  for (const auto& [name, value] : file) {
+    const Entry entry(path, std::string(name.str()), value);
+    if (entry.key != "layer") entry.refuseKey("a recipe", {"layer"});
+    const toml::array* tables = value.as_array();
+    if (!tables || !tables->is_homogeneous<toml::table>())
+      entry.refuse("is a list of tables, each below a line [[layer]]");
+    for (const toml::node& table : *tables) layers.push_back(recipeOf(path, *table.as_table()));
+  }
+  if (layers.empty()) throw CLI::ValidationError("--recipe", path + ": has no [[layer]]");
+  if (layers.size() > std::size_t(kMaxCumuloLayers))
+    throw CLI::ValidationError("--recipe", fmt::format("{}: has {} layers, allowed: 1 to {}", path,
+                                                       layers.size(), kMaxCumuloLayers));
+  return layers;
+}
+
+std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,
+                                      FieldSources& sources) {
+  std::vector<CumuloLayer> layers;
+  try {
+    layers = cumuloLayers(fractal);
+  } catch (const Error& error) {
+    // All else was checked when it was read; how far frequencies vary shows only here.
+    throw Error(fmt::format("--frequency, --lacunarity: {}", error.what()));
+  }
+  for (std::size_t i = 0; i < layers.size() && i < recipes.size(); ++i) {
+    try {
+      apply(recipes[i], int(i), fractal, sources, layers[i]);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      throw Error(what.starts_with("--recipe") ? what : recipes[i].place + ": " + what);
+    }
+  }
+  return layers;
+}
+
+}  // namespace nephele::apps

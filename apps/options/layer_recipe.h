@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/options/field_sources.h"
+#include "nephele/modeling/cloud/cumulo.h"
+
+namespace nephele::apps {
+
+/// One [[layer]] of a recipe; what is not given follows the fractal form. docs/recipes.md describes the keys.
+struct LayerRecipe {
+  /// "cloud.toml:7", for messages.
+  std::string place;
+  std::optional<NoiseKind> noise;
+  std::optional<SpectrumOptions> spectrum;
+  std::optional<float> time, period;
+  std::optional<std::uint32_t> seed;
+  int octaves = 1;
+  double octaveLacunarity = 2, octaveRoughness = 0.5;
+  std::optional<FieldValue> amplitude, frequency, billow, billowScale;
+  /// Multiplies the amplitude: from 0, no bumps, to 1.
+  std::optional<FieldValue> mask;
+  /// Where bumps grow: as high as stated where the surface faces this way, (1 - bias) of it where it faces
+  /// away, linear in the cosine between.
+  std::optional<Vec3f> direction;
+  double bias = 1;
+
+  bool changesNoise() const {
+    return noise || spectrum || time || period || seed || frequency || octaves > 1;
+  }
+};
+
+/// Reads the recipe of all layers. @throws CLI::ValidationError naming the file, the line, the key and what
+/// is allowed.
+std::vector<LayerRecipe> readLayerRecipe(const std::string& path);
+
+/// The layers of `fractal`, of which the first are changed as the recipes say. What is not changed is the
+/// same bit for bit. @throws Error naming the place in the recipe.
+std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,
+                                      FieldSources& sources);
+
+}  // namespace nephele::apps

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/app.h"
+#include "nephele/render/scene/environment.h"
+#include "nephele/render/scene/lights.h"
+#include "nephele/render/scene/medium.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele::apps {
+
+/// The lights as the command line gives them.
+struct LightOptions {
+  /// What is said of one light, or of all where the name is empty.
+  template <class T>
+  using Said = std::vector<std::pair<std::string, T>>;
+  struct DecayFrom {
+    Decay decay = Decay::quadratic;
+    float start = 0;
+  };
+
+  Lights lights{{}, {0.10f, 0.17f, 0.28f}};
+  bool noSun = false;
+  Said<DecayFrom> decays;
+  Said<Vec3f> shadows;
+  bool deepShadows = false;
+  float deepTolerance = 2e-3f;
+  /// Files to take a light's shadow from, and to write it to.
+  Said<std::string> readShadows, writtenShadows;
+  /// A sky from a file.
+  std::string skyFile;
+  Environment::Options sky;
+
+  /// The lights of the picture; one sun where no light is given but a sky of one colour. Reads the sky's map.
+  /// @throws Error if a name is unknown or taken twice, or a file cannot be read.
+  Lights resolved() const;
+  /// Writes the deep shadow maps that are asked for. @throws Error naming the light or the file.
+  void writeShadows(const RenderVolume& volume, const Lights& resolved, const Medium& medium,
+                    const Run& run) const;
+};
+
+/// Declares the options of lights on `app`.
+void addLightOptions(CLI::App& app, LightOptions& options);
+/// Declares the option for LightOptions::writeShadows.
+void addShadowOutput(CLI::App& app, LightOptions& options);
+
+}  // namespace nephele::apps

@@ -1,0 +1,96 @@
+#include "apps/options/object_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/render/image/texture_image.h"
+
+namespace nephele::apps {
+namespace {
+
+Mesh readObject(const std::string& path) {
+  if (!path.ends_with(".vdb")) return readMesh(path);
+  const VdbGrid grid = readScalarGrid(path);
+  if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
+    throw Error(fmt::format("{}: grid '{}' is not a level set, which objects are", path, info.name));
+  return marchingCubes(*toBricks(grid));
+}
+
+bool hasCoordinates(const Mesh& mesh) {
+  return std::ranges::any_of(mesh.attributes, [](const MeshAttribute& a) {
+    return a.name == "uv" && a.domain == MeshAttribute::Domain::corner && a.width == 2;
+  });
+}
+
+}  // namespace
+
+void addObjectOptions(CLI::App& app, ObjectOptions& options) {
+  CLI::Option* object =
+      app.add_option("--object", options.objects,
+                     "Opaque object beside the volume: a mesh, or a level set (.vdb); may be given again.")
+          ->type_name("FILE")
+          ->allow_extra_args(false)
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--holdout-object", options.holdouts,
+                 "The same as a holdout: hides what is behind it, and is not seen itself.")
+      ->type_name("FILE")
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  addNumbers(
+      app, "--object-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
+      "Share of the light that objects scatter.")
+      ->needs(object)
+      ->default_str("0.5,0.5,0.5");
+  addCount(app, "--checker", options.checkers, 0, 10000,
+           "Fields of a chess board across the texture coordinates of objects; 0: none.")
+      ->needs(object);
+  app.add_option("--texture", options.texture,
+                 "Picture (.png, .exr) on the texture coordinates of objects; times their colour.")
+      ->type_name("FILE")
+      ->needs(object);
+  app.add_flag("--backdrop", options.backdrop,
+               "A sky behind the preview, as the layer backdrop: that of --sky FILE, or a gradient.");
+  CLI::Option* ground = app.add_flag("--ground", options.ground,
+                                     "A plane below the volume, in its shadow, as wide as can be seen.");
+  addOptional(app, "--ground-height", options.groundHeight, -1e9, 1e9,
+              "Of the plane; default: the bottom of the volume.")
+      ->needs(ground);
+  addNumbers(
+      app, "--ground-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.groundColour = v; },
+      "Share of the light that the plane scatters.")
+      ->needs(ground)
+      ->default_str("0.3,0.3,0.3");
+}
+
+std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume) const {
+  std::vector<SurfaceObject> all;
+  const auto image = texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(texture));
+  for (const std::string& path : objects) {
+    SurfaceObject object{readObject(path), colour, checkers, image};
+    if ((checkers > 0 || image) && !hasCoordinates(object.mesh))
+      throw Error(fmt::format("{}: has no texture coordinates, which --{} needs", path,
+                              image ? "texture" : "checker"));
+    all.push_back(std::move(object));
+  }
+  for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path), .isHoldout = true});
+  if (ground) {
+    const Box& box = volume.worldBounds();
+    all.push_back({.mesh = groundPlane(box.center(), float(groundHeight.value_or(double(box.min.y))),
+                                       200 * box.longestSide()),
+                   .colour = groundColour,
+                   .castsShadows = false});
+  }
+  return all.empty() ? nullptr : std::make_shared<const Surfaces>(std::move(all));
+}
+
+void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume) const {
+  picture.render.surfaces = surfaces(volume);
+  if (picture.pathTraced && picture.render.surfaces)
+    refuseValue("--integrator", "path", "march, where there are objects");
+}
+
+}  // namespace nephele::apps

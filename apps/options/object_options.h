@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/app.h"
+#include "apps/options/render_options.h"
+#include "nephele/render/scene/surfaces.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele::apps {
+
+/// What stands in the picture beside the volume.
+struct ObjectOptions {
+  std::vector<std::string> objects, holdouts;
+  Vec3f colour{0.5f, 0.5f, 0.5f};
+  int checkers = 0;
+  std::string texture;
+  bool ground = false, backdrop = false;
+  /// Height of the ground; the bottom of the volume if not given.
+  std::optional<double> groundHeight;
+  Vec3f groundColour{0.3f, 0.3f, 0.3f};
+
+  /// Reads the files; null where there are no objects. @throws Error naming the file.
+  std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume) const;
+  /// Puts them into `picture`. @throws Error as `surfaces`, CLI::Error if it is to be path traced.
+  void addTo(PictureOptions& picture, const RenderVolume& volume) const;
+};
+
+/// Declares the options on `app`.
+void addObjectOptions(CLI::App& app, ObjectOptions& options);
+
+}  // namespace nephele::apps

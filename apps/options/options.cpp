@@ -1,0 +1,253 @@
+#include "apps/options/options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+namespace nephele::apps {
+
+std::optional<double> parseNumber(std::string_view text) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+void refuseValue(const std::string& name, const std::string& text, const std::string& allowed) {
+  const std::size_t comma = name.rfind(',');
+  throw CLI::ValidationError(comma == std::string::npos ? name : name.substr(comma + 1),
+                             fmt::format("got '{}', allowed: {}", text, allowed));
+}
+
+CLI::Option* addLength(CLI::App& app, const std::string& name, Length& target, const std::string& description,
+                       Sign sign) {
+  const std::string allowed =
+      fmt::format("a length {} 0 in world units (0.3) or percent of the longest side (5%)",
+                  sign == Sign::positive ? ">" : ">=");
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name, sign, allowed](const std::string& text) {
+        const bool relative = text.ends_with('%');
+        const auto value = parseNumber(std::string_view(text).substr(0, text.size() - (relative ? 1 : 0)));
+        if (!value || *value < 0 || (sign == Sign::positive && *value == 0)) refuseValue(name, text, allowed);
+        target = {*value, relative};
+      },
+      description);
+  option->type_name("LENGTH");
+  if (target.value > 0) option->default_str(fmt::format("{:g}{}", target.value, target.relative ? "%" : ""));
+  return option;
+}
+
+CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& target,
+                          const std::string& description) {
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name](const std::string& text) {
+        const bool relative = text.ends_with('x');
+        const auto value = parseNumber(std::string_view(text).substr(0, text.size() - (relative ? 1 : 0)));
+        if (!value || *value <= 0)
+          refuseValue(name, text, "cycles > 0 per world unit (2.5) or per longest side (6x)");
+        target = {*value, relative};
+      },
+      description);
+  option->type_name("FREQUENCY");
+  if (target.value > 0) option->default_str(fmt::format("{:g}{}", target.value, target.relative ? "x" : ""));
+  return option;
+}
+
+CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, const std::string& description) {
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name](const std::string& text) {
+        const auto v = parseNumbers(name, text, "three numbers x,y,z");
+        if (v.size() != 3) refuseValue(name, text, "three numbers x,y,z");
+        target = {float(v[0]), float(v[1]), float(v[2])};
+      },
+      description);
+  option->type_name("X,Y,Z");
+  option->default_str(fmt::format("{:g},{:g},{:g}", target.x, target.y, target.z));
+  return option;
+}
+
+namespace {
+
+CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
+                       const std::function<void(double)>& set, const std::string& description) {
+  const std::string allowed = high < std::numeric_limits<double>::max()
+                                  ? fmt::format("a number from {:g} to {:g}", low, high)
+                                  : fmt::format("a number of at least {:g}", low);
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [name, low, high, allowed, set](const std::string& text) {
+        const auto value = parseNumber(text);
+        if (!value || *value < low || *value > high) refuseValue(name, text, allowed);
+        set(*value);
+      },
+      description);
+  option->type_name("NUMBER");
+  return option;
+}
+
+}  // namespace
+
+CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
+                       const std::string& description) {
+  return addNumber(
+             app, name, low, high, [&target](double value) { target = value; }, description)
+      ->default_str(fmt::format("{:g}", target));
+}
+
+CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
+                         double high, const std::string& description) {
+  return addNumber(
+      app, name, low, high, [&target](double value) { target = value; }, description);
+}
+
+CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
+                        double low, double high, const std::function<void(const Vec3f&)>& set,
+                        const std::string& description) {
+  constexpr double any = std::numeric_limits<double>::max();
+  const std::string allowed = low > -any ? fmt::format("{}, each {} to {:g}", form, low, high) : form;
+  const std::string wanted = high < any   ? allowed
+                             : low > -any ? fmt::format("{}, each at least {:g}", form, low)
+                                          : form;
+  return app
+      .add_option_function<std::string>(
+          name,
+          [=](const std::string& text) {
+            const std::vector<double> numbers = parseNumbers(name, text, wanted);
+            bool fits = numbers.size() == count;
+            for (const double number : numbers) fits = fits && number >= low && number <= high;
+            if (!fits) refuseValue(name, text, wanted);
+            set({float(numbers[0]), float(numbers[1]), count > 2 ? float(numbers[2]) : 0.0f});
+          },
+          description)
+      ->type_name(form);
+}
+
+CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int low, int high,
+                      const std::string& description) {
+  const std::string allowed = high < std::numeric_limits<int>::max()
+                                  ? fmt::format("a whole number from {} to {}", low, high)
+                                  : fmt::format("a whole number of at least {}", low);
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name, low, high, allowed](const std::string& text) {
+        int value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
+          refuseValue(name, text, allowed);
+        target = value;
+      },
+      description);
+  option->type_name("COUNT");
+  option->default_str(std::to_string(target));
+  return option;
+}
+
+CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& target,
+                       const std::vector<std::string>& extensions, const std::string& description) {
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name, extensions](const std::string& text) {
+        std::string extension = std::filesystem::path(text).extension().string();
+        std::transform(extension.begin(), extension.end(), extension.begin(),
+                       [](unsigned char c) { return std::tolower(c); });
+        if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end()) {
+          std::string allowed;
+          for (const std::string& e : extensions) allowed += (allowed.empty() ? "" : ", ") + e;
+          refuseValue(name, text, "a file that ends in " + allowed);
+        }
+        target = text;
+      },
+      description);
+  option->type_name("FILE");
+  return option;
+}
+
+CLI::Option* addRepair(CLI::App& app, MeshRepairOptions::Mode& target) {
+  using Mode = MeshRepairOptions::Mode;
+  return addChoice<Mode>(
+      app, "--repair", target, {{"auto", Mode::automatic}, {"off", Mode::off}, {"wrap", Mode::wrap}},
+      "What to do with a mesh that is not closed: auto repairs it, off refuses it; wrap wraps every mesh.");
+}
+
+std::vector<double> parseNumbers(const std::string& option, const std::string& text,
+                                 const std::string& form) {
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  while (true) {
+    const std::size_t comma = rest.find(',');
+    const auto value = parseNumber(rest.substr(0, comma));
+    if (!value) refuseValue(option, text, form);
+    numbers.push_back(*value);
+    if (comma == std::string_view::npos) return numbers;
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+std::string closestWord(const std::string& word, const std::vector<std::string>& candidates) {
+  std::string best;
+  std::size_t bestDistance = word.size() / 3 + 2;
+  for (const std::string& candidate : candidates) {
+    std::vector<std::size_t> row(candidate.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t(0));
+    for (std::size_t i = 0; i < word.size(); ++i) {
+      std::size_t diagonal = row[0];
+      row[0] = i + 1;
+      for (std::size_t j = 0; j < candidate.size(); ++j) {
+        const std::size_t substituted = diagonal + (word[i] == candidate[j] ? 0 : 1);
+        diagonal = row[j + 1];
+        row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
+      }
+    }
+    if (row.back() < bestDistance) {
+      bestDistance = row.back();
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& height,
+                     const std::string& description) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, &width, &height](const std::string& text) {
+            int w = 0, h = 0, used = 0;
+            if (std::sscanf(text.c_str(), "%dx%d%n", &w, &h, &used) != 2 ||
+                std::size_t(used) != text.size() || w < 1 || h < 1 || w > 65536 || h > 65536)
+              refuseValue(name, text, "WxH, each 1 to 65536");
+            width = w;
+            height = h;
+          },
+          description)
+      ->type_name("WxH")
+      ->default_str(fmt::format("{}x{}", width, height));
+}
+
+void addPreviewFrame(CLI::App& app, CLI::Option* preview, int& width, int& height, float& azimuthDegrees,
+                     float& elevationDegrees) {
+  addSize(app, "--size", width, height, "Pixels across and down.")->needs(preview);
+  addNumbers(
+      app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360,
+      [&azimuthDegrees, &elevationDegrees](const Vec3f& v) {
+        azimuthDegrees = v.x;
+        elevationDegrees = v.y;
+      },
+      "Where the camera stands, in degrees: azimuth from the front (+z) towards +x, elevation from the "
+      "horizon.")
+      ->default_str(fmt::format("{:g},{:g}", azimuthDegrees, elevationDegrees))
+      ->needs(preview);
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,151 @@
+#include "apps/options/render_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/render/march/film.h"
+
+namespace nephele::apps {
+namespace {
+
+constexpr double kBrightest = 1e30;
+
+[[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& allowed) {
+  throw CLI::ValidationError(option, fmt::format("got '{}', allowed: {}", text, allowed));
+}
+
+void addMedium(CLI::App& app, PictureOptions& options) {
+  app.add_option_function<double>(
+         "--extinction",
+         [&options](double value) {
+           if (!(value >= 0 && value < 1e30))
+             refuse("--extinction", fmt::format("{:g}", value), "a number of at least 0");
+           options.extinction = float(value);
+         },
+         "Extinction per world unit where the density is 1.")
+      ->type_name("NUMBER")
+      ->default_str("150 / longest side of the volume");
+  addNumbers(
+      app, "--albedo", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.medium.albedo = v; },
+      "Share of the light met that is scattered.")
+      ->default_str(fmt::format("{:g},{:g},{:g}", options.medium.albedo.x, options.medium.albedo.y,
+                                options.medium.albedo.z));
+  addNumbers(
+      app, "--extinction-color", "R,G,B", 3, 0, 1e6,
+      [&options](const Vec3f& v) { options.medium.extinctionColour = v; },
+      "Multiplies the extinction, per colour.")
+      ->default_str("1,1,1");
+  app.add_option_function<std::string>(
+         "--phase",
+         [&options](const std::string& text) {
+           try {
+             options.medium.phase = Phase::parse(text);
+           } catch (const Error&) {
+             refuse("--phase", text, Phase::forms());
+           }
+         },
+         "Where scattered light goes: Henyey-Greenstein with mean cosine G, Schlick's form, two "
+         "Henyey-Greenstein lobes of which the second has the share MIX, or water droplets by their "
+         "diameter.")
+      ->type_name("isotropic|rayleigh|hg:G|schlick:K|two-lobe:G1,G2,MIX|mie:MICROMETRES")
+      ->default_str(fmt::format("hg:{:g}", options.medium.phase.meanCosine()));
+  addCount(app, "--octaves", options.render.octaves.count, 1, 16,
+           "Octaves of light that goes on through the volume but little bent; 1 is single scattering.");
+}
+
+void addIntegrator(CLI::App& app, PictureOptions& options) {
+  app.add_option_function<std::string>(
+         "--integrator", [&options](const std::string& text) { options.pathTraced = text == "path"; },
+         "march: without noise; path: the unbiased and noisy reference.")
+      ->type_name("TEXT")
+      ->check(CLI::IsMember({"march", "path"}))
+      ->default_str("march");
+  addCount(app, "--spp", options.path.samplesPerPixel, 1, 1 << 20, "Paths per pixel of --integrator path.");
+  addCount(app, "--scatterings", options.path.maxScatterings, 0, 1000000,
+           "Scatterings at which paths end, 0: never.");
+}
+
+}  // namespace
+
+void addPictureOptions(CLI::App& app, PictureOptions& options) {
+  addVolumeOptions(app, options.volumes);
+  addCameraOptions(app, options);
+  addLightOptions(app, options.light);
+  addMedium(app, options);
+  addLength(app, "--step", options.step, "Longest step along a ray.", Sign::positive)
+      ->default_str("one voxel");
+  addCount(app, "--samples", options.render.samples, 1, 4096, "Rays per pixel.")
+      ->each([&options](const std::string&) { options.samplesGiven = true; })
+      ->default_str("4, or 64 with depth of field or motion blur");
+  addNumber(
+      app, "--adaptive", options.adaptiveThreshold, 0, 1,
+      "March only pixels whose neighbours differ by more than this share of brightness or opacity; 0: all.");
+  addIntegrator(app, options);
+  addCount(app, "--seed", options.seed, 0, 1 << 30, "Moves the pattern of the samples.");
+  std::vector<std::string> layers = Film::layerNames();
+  std::string names = layers.front();
+  for (std::size_t i = 1; i != layers.size(); ++i) names += "," + layers[i];
+  layers.push_back("none");
+  app.add_option("--aov", options.render.aovs,
+                 "Layers beside R, G, B and A: none, or several of " + names + ".")
+      ->type_name("LIST")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(layers))
+      ->default_str("Z");
+  app.add_option_function<double>(
+         "--exposure",
+         [&options](double stops) {
+           if (std::isnan(stops)) refuse("--exposure", "nan", "a number from -20 to 20");
+           options.screen.exposureStops = float(stops);
+         },
+         "Of the preview, in stops.")
+      ->type_name("STOPS")
+      ->check(CLI::Range(-20.0, 20.0))
+      ->default_str("0");
+  addNumbers(
+      app, "--background", "R,G,B", 3, 0, kBrightest, [&options](const Vec3f& v) { options.background = v; },
+      "Linear colour behind the preview.")
+      ->default_str("the sky's");
+}
+
+PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
+  PictureOptions result = *this;
+  result.extinction = extinction ? *extinction : defaultExtinction(volume);
+  result.medium.extinction = *result.extinction;
+  if (step.value > 0) result.render.step = float(step.worldUnits(double(volume.worldBounds().longestSide())));
+  if (adaptiveThreshold > 0 && pathTraced)
+    refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
+  result.render.adaptiveThreshold = float(adaptiveThreshold);
+  result.lights = light.resolved();
+  result.screen.background =
+      background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
+  std::erase(result.render.aovs, "none");
+  result.render.shutter = shutter;
+  result.volumeFlows = !volumes.velocityGrids.empty();
+  result.render.volumeMotion = motionOf(volume);
+  if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
+    result.render.nextCamera = laterCamera(volume, 1);
+  result.path.aovs = result.render.aovs;
+  result.path.seed = result.render.seed = std::uint32_t(seed);
+  result.path.shutter = result.render.shutter;
+  result.path.volumeMotion = result.render.volumeMotion;
+  result.path.nextCamera = result.render.nextCamera;
+  return result;
+}
+
+RenderOptions PictureOptions::marched(const Camera& camera) const {
+  RenderOptions options = render;
+  if (!samplesGiven && (camera.hasLens() || camera.isMoving() || render.volumeMotion)) options.samples = 64;
+  return options;
+}
+
+RenderResult PictureOptions::picture(const RenderVolume& volume, const Camera& camera,
+                                     const Progress& progress) const {
+  if (pathTraced) return pathTraceImage(volume, medium, lights, camera, path, progress);
+  return renderImage(volume, medium, lights, camera, marched(camera), progress);
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/app.h"
+#include "apps/options/camera_options.h"
+#include "apps/options/light_options.h"
+#include "apps/options/volume_options.h"
+#include "nephele/render/image/image.h"
+#include "nephele/render/march/path_trace.h"
+#include "nephele/render/march/raymarch.h"
+
+namespace nephele::apps {
+
+/// What to look at, from where and in which light: the options that every verb that makes pictures takes.
+struct PictureOptions : CameraOptions {
+  VolumeOptions volumes;
+  LightOptions light;
+  /// Made from `light` by `resolved`.
+  Lights lights;
+  Medium medium;
+  /// Of the volume if not given, see defaultExtinction.
+  std::optional<float> extinction;
+  Length step;
+  double adaptiveThreshold = 0;
+  RenderOptions render;
+  bool samplesGiven = false;
+  int seed = 0;
+  /// Path traces instead of marching; layers and seed are those of `render`.
+  bool pathTraced = false;
+  PathOptions path;
+  ViewTransform screen;
+  /// Behind the preview; the sky's radiance if not given.
+  std::optional<Vec3f> background;
+
+  /// These options with everything filled in that follows from `volume`.
+  PictureOptions resolved(const RenderVolume& volume) const;
+  /// `render` with the rays per pixel that suit `camera`, unless they were given.
+  RenderOptions marched(const Camera& camera) const;
+  /// Marches or path traces; `resolved` comes first.
+  RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
+};
+
+/// Declares the options on `app`.
+void addPictureOptions(CLI::App& app, PictureOptions& options);
+
+}  // namespace nephele::apps

@@ -1,0 +1,48 @@
+#include "apps/options/shape_options.h"
+
+#include <fmt/format.h>
+
+#include "nephele/levelset/io/mesh_io.h"
+
+namespace nephele::apps {
+
+Mesh ShapeArguments::shape(Run& run) const {
+  if (input.empty() && !species)
+    throw CLI::ValidationError("input", "give a mesh or a level set to grow a cloud on, or --species");
+  Mesh mesh;
+  if (species) {
+    run.begin("shape");
+    mesh = cloudShapeMesh({.species = *species, .seed = std::uint32_t(seed), .size = float(size)}, run);
+  } else {
+    run.begin("read");
+    RepairedMesh read = readShape(input, repair, run);
+    for (const std::string& note : read.repairs) run.note(note);
+    mesh = std::move(read.mesh);
+  }
+  if (!meshOutput.empty()) {
+    writeMesh(meshOutput, mesh);
+    run.result(fmt::format("{}: the shape, {} faces", meshOutput, mesh.faceCount()));
+  }
+  return mesh;
+}
+
+void addShapeOptions(CLI::App& app, ShapeArguments& a) {
+  auto* input = app.add_option("input", a.input, "Mesh, or level set (.vdb, .nvdb), to grow a cloud on.")
+                    ->type_name("FILE");
+  std::vector<std::pair<std::string, std::optional<CloudSpecies>>> choices;
+  for (const CloudSpecies species : cloudSpecies())
+    choices.emplace_back(std::string(speciesName(species)), species);
+  auto* species = addChoice<std::optional<CloudSpecies>>(
+                      app, "--species", a.species, choices,
+                      "Grow the cloud on a shape of this species of cumulus, without an input.")
+                      ->excludes(input);
+  addCount(app, "--shape-seed", a.seed, 0, 1 << 30, "Another seed is another shape of the species.")
+      ->needs(species);
+  addNumber(app, "--shape-size", a.size, 1e-6, 1e9, "Longest side of the shape, world units.")
+      ->needs(species);
+  addOutput(app, "--shape-mesh", a.meshOutput, {".obj", ".ply", ".stl"},
+            "Also write what the cloud grows on, before any layer.");
+  addRepair(app, a.repair.mode);
+}
+
+}  // namespace nephele::apps

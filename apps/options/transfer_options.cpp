@@ -1,0 +1,151 @@
+#include "apps/options/transfer_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace nephele::apps {
+namespace {
+
+void addPictures(CLI::App& app, TransferArguments& a) {
+  CLI::Option* texture =
+      app.add_option("--texture", a.texture, "Picture (.png, .exr) on the reference's texture coordinates.")
+          ->type_name("FILE");
+  CLI::Option* bake = addOutput(app, "--bake-texture", a.bakedTexture, {".png"},
+                                "Write this picture laid out for the object's own texture coordinates.")
+                          ->needs(texture);
+  addSize(app, "--bake-size", a.bake.width, a.bake.height, "Texels of the baked texture.")
+      ->each([&a](const std::string&) { a.bakeSizeGiven = true; })
+      ->default_str("as the texture")
+      ->needs(bake);
+  addCount(app, "--bake-samples", a.bake.samples, 1, 16, "Samples per texel, along either side.")
+      ->needs(bake);
+  addCount(app, "--gutter", a.bake.gutter, 0, 1024, "Texels that continue the charts of the baked texture.")
+      ->needs(bake);
+  CLI::Option* preview =
+      addOutput(app, "--preview", a.preview, {".png"},
+                "Picture of the reference and the object beside it, with the texture or a checker.");
+  addPreviewFrame(app, preview, a.picture.width, a.picture.height, a.picture.azimuthDegrees,
+                  a.picture.elevationDegrees);
+  addCount(app, "--checker", a.picture.checkers, 1, 10000,
+           "Fields of the chess board across the texture coordinates, where there is no texture.")
+      ->needs(preview);
+}
+
+/// Whether the format of `path` can hold `attribute`, once it is carried.
+bool holds(const std::string& path, const MeshAttribute& attribute) {
+  if (path.ends_with(".ply") || (attribute.name == "uv" && attribute.width == 2)) return true;
+  return attribute.domain == MeshAttribute::Domain::vertex && attribute.name == "color" &&
+         attribute.width >= 3;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& object, const Run& run) const {
+  const auto hasUv = [](const Mesh& mesh) {
+    return std::ranges::any_of(mesh.attributes,
+                               [](const MeshAttribute& a) { return a.name == "uv" && a.width == 2; });
+  };
+  for (const auto& [option, isGiven] :
+       {std::pair{"--texture", !texture.empty()}, std::pair{"--preview", !preview.empty()}})
+    if (isGiven && !hasUv(reference))
+      throw Error(fmt::format("{}: has no texture coordinates, which {} needs", from, option));
+  if (!bakedTexture.empty() && !hasUv(object))
+    throw Error(fmt::format("{}: has no texture coordinates, which --bake-texture needs", to));
+
+  std::vector<std::string> all, fit, other;
+  for (const MeshAttribute& a : reference.attributes) {
+    all.push_back(a.name);
+    // A baked texture is laid out for the object's own.
+    if ((a.name == "uv" && !bakedTexture.empty()) || a.name == "nx" || a.name == "ny" || a.name == "nz")
+      continue;
+    (holds(output, a) ? fit : other).push_back(a.name);
+  }
+  if (!transfer.names.empty()) {
+    for (const std::string& name : transfer.names) {
+      const auto found = std::ranges::find(reference.attributes, name, &MeshAttribute::name);
+      if (found == reference.attributes.end())
+        throw Error(fmt::format("{}: has no attribute '{}'; it has {}", from, name,
+                                all.empty() ? "none" : listed(all)));
+      if (!holds(output, *found))
+        throw Error(
+            fmt::format("{}: cannot hold '{}': .obj holds uv and the color of vertices, .ply every attribute",
+                        output, name));
+      if (name == "uv" && !bakedTexture.empty())
+        throw Error(
+            fmt::format("{}: '--attributes uv' would replace the texture coordinates that "
+                        "--bake-texture is laid out for",
+                        to));
+    }
+    if (!preview.empty() && bakedTexture.empty() && std::ranges::count(transfer.names, "uv") == 0)
+      refuseValue("--attributes", listed(transfer.names), "a list with uv, which --preview shows");
+    return transfer;
+  }
+  if (!other.empty()) run.note(fmt::format("{} cannot hold {}, left out; a .ply can", output, listed(other)));
+  if (fit.empty() && bakedTexture.empty())
+    throw Error(fmt::format("{}: has no attributes that {} can hold{}", from, output,
+                            all.empty() ? "" : "; it has " + listed(all)));
+  return {fit};
+}
+
+TextureBakeOptions TransferArguments::bakeOptions(const Image& image) const {
+  TextureBakeOptions options = bake;
+  if (!bakeSizeGiven) {
+    options.width = image.width;
+    options.height = image.height;
+  }
+  return options;
+}
+
+void addTransferOptions(CLI::App& app, TransferArguments& a) {
+  app.add_option("--from", a.from, "Reference: the mesh that has the attributes.")
+      ->required()
+      ->type_name("FILE");
+  app.add_option("--to", a.to, "Object: the mesh that gets them.")->required()->type_name("FILE");
+  addOutput(app, "-o,--output", a.output, {".obj", ".ply"}, "The object with the attributes.")->required();
+  app.add_option_function<std::string>(
+         "--attributes",
+         [&a](const std::string& text) {
+           a.transfer.names.clear();
+           for (std::size_t begin = 0; begin <= text.size();) {
+             const std::size_t end = std::min(text.find(',', begin), text.size());
+             if (end == begin) refuseValue("--attributes", text, "names, separated by commas");
+             a.transfer.names.push_back(text.substr(begin, end - begin));
+             begin = end + 1;
+           }
+         },
+         "What to carry: uv, color, names of other attributes.")
+      ->type_name("NAME,...")
+      ->default_str("all but normals");
+
+  addChoice(app, "--method", a.warp.method,
+            {{"nacelle", WarpMethod::nacelle}, {"closest", WarpMethod::closest}},
+            "A warp field between level sets, or closest points.");
+  addChoice(
+      app, "--align", a.warp.align,
+      {{"none", Alignment::none}, {"similarity", Alignment::similarity}, {"lattice", Alignment::lattice}},
+      "Turn, scale and shift the object onto the reference first; lattice: and bend it.");
+  addChoice(app, "--quality", a.warp.quality,
+            {{"fast", WarpQuality::fast}, {"balanced", WarpQuality::balanced}, {"best", WarpQuality::best}},
+            "fast: the warp field as it is; else relaxed where it folds over, for longer with best.");
+  addCount(app, "--iterations", a.warp.steps, 1, 20, "Steps of the warp field at most.");
+  addCount(app, "--order", a.warp.order, 1, 2, "Of a step: 1 along gradients, 2 with second derivatives.")
+      ->default_str("1");
+  addCount(
+      app, "--resolution", a.resolution, 8, 100000,
+      "Voxels along the longest side: of the reference, the unit of residuals; of the object, for --warp "
+      "and --warped-mesh.");
+  addOutput(app, "--warp", a.warpFile, {".vdb"},
+            "Write the map as a vector grid 'rest', in bricks about the object.");
+  addOutput(app, "--warped-mesh", a.warpedMesh, {".obj", ".ply", ".stl"},
+            "Write the reference's level set, warped, as a mesh.");
+  addPictures(app, a);
+}
+
+}  // namespace nephele::apps

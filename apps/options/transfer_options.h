@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/app.h"
+#include "nephele/levelset/warp/mesh_warp.h"
+#include "nephele/levelset/warp/transfer_attributes.h"
+#include "nephele/render/preview/texture_bake.h"
+#include "nephele/render/preview/transfer_picture.h"
+
+namespace nephele::apps {
+
+/// What is to be carried from where to where.
+struct TransferArguments {
+  std::string from, to, output;
+  TransferOptions transfer;
+  MeshWarpOptions warp;
+  int resolution = 256;
+  std::string warpFile, warpedMesh;
+  std::string texture, bakedTexture, preview;
+  TextureBakeOptions bake;
+  /// That of the reference's picture, unless given.
+  bool bakeSizeGiven = false;
+  TransferPictureOptions picture;
+
+  /// The attributes to carry: those asked for, or all that the output can hold. Says what is left out.
+  /// @throws Error naming a file that lacks what is asked for or cannot hold it.
+  TransferOptions chosen(const Mesh& reference, const Mesh& object, const Run& run) const;
+  /// `bake` with its size filled in.
+  TextureBakeOptions bakeOptions(const Image& image) const;
+};
+
+/// Declares the options on `app`.
+void addTransferOptions(CLI::App& app, TransferArguments& arguments);
+
+}  // namespace nephele::apps

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "apps/options/options.h"
+#include "nephele/modeling/noise/noises.h"
+
+namespace nephele::apps {
+
+/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", or a volume file.
+struct VelocityArguments {
+  enum class Source { noise, curl, file };
+
+  Source source = Source::noise;
+  /// Rms of each component, per unit of time.
+  Length amplitude{1, true};
+  Frequency frequency{6, true};
+  NoiseKind kind = NoiseKind::perlin;
+  int octaves = 1, seed = 0;
+  double lacunarity = 2, roughness = 0.5;
+  std::optional<float> time;
+  /// Of the file: its path and the name of the grid, or "" to look for the usual ones.
+  std::string path, grid;
+
+  /// The velocity around a shape of this longest side. @throws Error naming the file.
+  VectorField field(double longestSide) const;
+};
+
+/// Reads `text`, the value of the option `name`. @throws CLI::ValidationError naming the option, the key and
+/// what is allowed.
+void parseVelocity(const std::string& name, const std::string& text, VelocityArguments& velocity);
+
+}  // namespace nephele::apps

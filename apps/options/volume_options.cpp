@@ -1,0 +1,166 @@
+#include "apps/options/volume_options.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <utility>
+
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/render/volume/volume_parts.h"
+
+namespace nephele::apps {
+namespace {
+
+// Brings errors that concern one file under its name.
+template <class Body>
+void naming(const std::string& path, Body&& body) {
+  try {
+    body();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    if (std::string_view(error.what()).starts_with(path)) throw;
+    throw Error(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
+std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::string& grid, Run& run) {
+  const VdbGrid vdb = readScalarGrid(path, grid);
+  const VdbGridInfo info = describe(vdb);
+  if (info.gridClass == VdbGridInfo::Class::levelSet)
+    throw Error(fmt::format("{}: grid '{}' is a level set, not a density; 'nephele cloud' makes one of it",
+                            path, info.name));
+  // A brick holds 11^3 samples for 8^3 voxels, rarely all in use.
+  const Vec3d size(info.indexMax - info.indexMin);
+  run.requireMemory(
+      25.0 * double(info.activeVoxels) + (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 6,
+      "make the volume with larger voxels");
+  return toBricks(vdb);
+}
+
+VolumePart::Grids readThree(const std::string& path, const std::string& grid, double scale = 1) {
+  VolumePart::Grids result;
+  const std::array<VdbGrid, 3> parts = readVectorGrid(path, grid);
+  for (std::size_t c = 0; c != 3; ++c) {
+    const auto bricks = toBricks(parts[c]);
+    if (scale != 1) {
+      const auto factor = float(scale);
+      for (float& value : bricks->values) value *= factor;
+      for (Interval& range : bricks->ranges) range = {range.min * factor, range.max * factor};
+      bricks->background *= factor;
+    }
+    result[c] = bricks;
+  }
+  return result;
+}
+
+// A grid of colours, or of numbers that glow white.
+VolumePart::Grids readGlow(const std::string& path, const std::string& grid, Run& run) {
+  std::shared_ptr<const BrickGrid> one;
+  try {
+    one = readFog(path, grid, run);
+  } catch (const Error&) {
+    // If it is no grid of colours either, that is what is said.
+    return readThree(path, grid);
+  }
+  return {one, one, one};
+}
+
+// The entry for volume `index` of a list with one for all, or one for each.
+template <class T>
+T entryOf(const std::vector<T>& list, std::size_t index, const T& standard) {
+  return list.empty() ? standard : list[list.size() > 1 ? index : 0];
+}
+
+VolumePart readPart(const std::string& path, std::size_t index, const VolumeOptions& options,
+                    const Shutter& shutter, Run& run) {
+  const auto nameIn = [&](const std::vector<std::string>& names) {
+    const std::string name = entryOf(names, index, std::string());
+    return name == "none" ? std::string() : name;
+  };
+  VolumePart part;
+  part.density = readFog(path, nameIn(options.densityGrids), run);
+  if (const std::string name = nameIn(options.colourGrids); !name.empty())
+    part.colour = readThree(path, name);
+  if (const std::string name = nameIn(options.emissionGrids); !name.empty())
+    part.emission = readGlow(path, name, run);
+  if (const std::string name = nameIn(options.temperatureGrids); !name.empty())
+    part.temperature = readFog(path, name, run);
+  if (const std::string name = nameIn(options.velocityGrids); !name.empty() && !shutter.isInstant()) {
+    part.velocity = readThree(path, name, options.velocityScale);
+    part.shutter = shutter;
+  }
+  part.share = float(entryOf(options.densityScales, index, 1.0));
+  part.emissionScale = float(options.emissionScale);
+  part.temperatureScale = float(options.temperatureScale);
+  return part;
+}
+
+void checkCount(const std::string& option, std::size_t given, std::size_t volumes) {
+  if (given > 1 && given != volumes)
+    throw Error(fmt::format("{}: got {} entries for {} volume{}, allowed: 1 or {}", option, given, volumes,
+                            volumes == 1 ? "" : "s", volumes));
+}
+
+}  // namespace
+
+void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
+  const auto addGrid = [&app](const std::string& name, std::vector<std::string>& target,
+                              const std::string& text) {
+    return app.add_option(name, target, text)
+        ->type_name("NAME[,NAME...]")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->default_str("none");
+  };
+  addGrid("--grid", options.densityGrids,
+          "Density in the file; several names are for one volume after the other, here and below.")
+      ->default_str("the first grid that holds numbers");
+  addGrid("--color-grid", options.colourGrids, "Colours, 0 to 1, that multiply the albedo: 'Cd'.");
+  addGrid("--emission-grid", options.emissionGrids,
+          "Numbers or colours that glow: as bright as this where density 1 is opaque.");
+  addGrid("--temperature-grid", options.temperatureGrids,
+          "Temperatures that glow as black bodies, luminance 1 at 2000 K.");
+  addNumber(app, "--temperature-scale", options.temperatureScale, 1e-6, 1e5,
+            "Kelvins where the temperature grid is 1.");
+  addGrid("--velocity-grid", options.velocityGrids,
+          "Velocities that blur the volume while the --shutter is open: world units per second, 24 frames "
+          "in one, unless --velocity-scale says otherwise.");
+  addNumber(app, "--velocity-scale", options.velocityScale, -1e6, 1e6,
+            "Multiplies the velocity grid: frames, to world units per frame.");
+  addNumber(app, "--emission-scale", options.emissionScale, 0, 1e12, "Multiplies all that glows.");
+  app.add_option_function<std::string>(
+         "--density-scale",
+         [&options](const std::string& text) {
+           const std::string form = "numbers of at least 0, one for all volumes or one for each";
+           options.densityScales = parseNumbers("--density-scale", text, form);
+           for (const double scale : options.densityScales)
+             if (!(scale >= 0 && scale <= 1e12)) refuseValue("--density-scale", text, form);
+         },
+         "Multiplies the densities: of all volumes, or of one after the other.")
+      ->type_name("NUMBER[,NUMBER...]")
+      ->default_str("1");
+}
+
+RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
+                         const Shutter& shutter, Run& run) {
+  checkCount("--grid", options.densityGrids.size(), paths.size());
+  checkCount("--color-grid", options.colourGrids.size(), paths.size());
+  checkCount("--emission-grid", options.emissionGrids.size(), paths.size());
+  checkCount("--temperature-grid", options.temperatureGrids.size(), paths.size());
+  checkCount("--velocity-grid", options.velocityGrids.size(), paths.size());
+  checkCount("--density-scale", options.densityScales.size(), paths.size());
+  if (!options.velocityGrids.empty() && shutter.isInstant())
+    throw CLI::ValidationError("--velocity-grid", "shows only while the shutter is open; give --shutter");
+  run.begin("read");
+  std::vector<VolumePart> parts;
+  for (std::size_t i = 0; i != paths.size(); ++i)
+    naming(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
+  run.requireMemory(estimateCombinedBytes(parts), "make the volumes with larger voxels");
+  if (paths.size() > 1) return combine(parts, run);
+  std::optional<RenderVolume> only;
+  naming(paths.front(), [&] { only.emplace(combine(parts, run)); });
+  return *std::move(only);
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,222 @@
+#include "apps/options/wisps_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "nephele/levelset/cloud/cloud.h"
+#include "nephele/levelset/io/point_io.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/shape/shapes.h"
+
+namespace nephele::apps {
+namespace {
+
+/// The longest side over a voxel of the grid that says what is inside a mesh.
+constexpr double kInsideResolution = 96;
+/// Radius of a dot where none is given, voxels.
+constexpr float kDotVoxels = 1.5f;
+
+Box boxOf(const Mesh& points) {
+  Box box;
+  for (const Vec3d& p : points.positions) box = box.including(Vec3f(p));
+  return box;
+}
+
+std::vector<WispGuide> inShape(WispsArguments::Shape shape, float size, const GuideOptions& options) {
+  Vec3f radii{size / 2, size / 2, size / 2};
+  if (shape == WispsArguments::Shape::disc) radii.y *= 0.15f;
+  if (shape == WispsArguments::Shape::streak) radii.y *= 0.1f, radii.z *= 0.1f;
+  return guidesInside(ellipsoid({0, 0, 0}, radii), {-radii, radii}, options);
+}
+
+std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const GuideOptions& options,
+                              Run& run) {
+  const RepairedMesh repaired = repairMesh(mesh, {}, run);
+  for (const std::string& repair : repaired.repairs) run.note(path + ": " + repair);
+  const Box box = boundingBox(repaired.mesh);
+  const double voxel = double(box.longestSide()) / kInsideResolution;
+  const ScalarField level = meshDistance(
+      repaired.mesh, {.voxelSize = voxel, .exteriorBand = 3 * voxel, .interiorBand = 3 * voxel}, run);
+  return guidesInside(level, box, options);
+}
+
+void parseVelocityOrWind(const std::string& text, WispsArguments& a) {
+  const std::string form = "three numbers X,Y,Z, noise:KEYS, curl:KEYS or a .vdb or .nvdb file";
+  if (text.find_first_not_of("0123456789+-.,eE") == std::string::npos) {
+    const std::vector<double> v = parseNumbers("--velocity", text, form);
+    if (v.size() != 3) refuseValue("--velocity", text, form);
+    a.wind = Vec3f{float(v[0]), float(v[1]), float(v[2])};
+    if (!isFinite(*a.wind)) refuseValue("--velocity", text, form);
+    return;
+  }
+  VelocityArguments velocity;
+  parseVelocity("--velocity", text, velocity);
+  a.velocity = velocity;
+}
+
+}  // namespace
+
+std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
+  GuideOptions options = guides;
+  options.count = std::size_t(guideCount);
+  options.seed = std::uint32_t(seed);
+  options.sizeVariation = float(sizeVariation);
+  options.standard.density = float(density);
+  if (input.empty()) {
+    run.begin("scatter");
+    options.standard.size = float(size.worldUnits(shapeSize));
+    return inShape(shape, float(shapeSize), options);
+  }
+  run.begin("read");
+  const Mesh mesh = readPoints(input);
+  const On where = on.value_or(mesh.faceCount() == 0 ? On::vertices : On::surface);
+  require(where == On::vertices || mesh.faceCount() > 0,
+          input + ": has no faces to scatter guides on; --on vertices puts one on each of its points");
+  const double side = double(boxOf(mesh).longestSide());
+  options.standard.size = float(size.worldUnits(side));
+  // A single point has no extent that a share could be taken of.
+  require(options.standard.size > 0, input + ": its points lie in one place; give --size in world units");
+  run.begin("scatter");
+  if (where == On::vertices) return guidesOnVertices(mesh, options);
+  return where == On::surface ? guidesOnSurface(mesh, options) : inMesh(input, mesh, options, run);
+}
+
+WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) const {
+  WispVolumeOptions result;
+  WispOptions& w = result.wisps;
+  w = {.dots = std::uint32_t(dots),
+       .correlation = float(correlation),
+       .walkLength = std::uint32_t(walkLength),
+       .amplitude = float(amplitude),
+       .radial = {octaves, float(frequency), float(lacunarity), float(roughness)},
+       .thickness = float(thickness),
+       .clump = float(clump),
+       .displacement = float(displacement),
+       .vector = {displacementOctaves, float(displacementFrequency), float(lacunarity),
+                  float(displacementRoughness)},
+       .seed = std::uint32_t(seed)};
+  const double side = double(wispBox(made, w).longestSide());
+  DotVolumeOptions& d = result.dots;
+  d.voxelSize = float(voxelSize.value > 0 ? voxelSize.worldUnits(side) : side / resolution);
+  // A smear is soft as it is, and large dots make it dear.
+  const bool smears = shutterOpen != 0 || shutterClose != 0;
+  d.radius = dotRadiusOption->count() > 0 ? float(dotRadius.worldUnits(side))
+             : smears                     ? 0.0f
+                                          : kDotVoxels * d.voxelSize;
+  if (d.radius > DotVolume::kLargestRadius * d.voxelSize)
+    throw CLI::ValidationError("--dot-radius",
+                               fmt::format("{:g} is more than {:g} voxels of {:g}; use larger "
+                                           "voxels or smaller dots",
+                                           d.radius, DotVolume::kLargestRadius, d.voxelSize));
+  d.shutterOpen = shutterOpen;
+  d.shutterClose = shutterClose;
+  d.withColor = std::any_of(made.begin(), made.end(), [](const WispGuide& g) {
+    return g.color != Vec3f{1, 1, 1};
+  });
+  const bool moves = wind || velocity || std::any_of(made.begin(), made.end(), [](const WispGuide& g) {
+                       return g.velocity != Vec3f{};
+                     });
+  if (smears && !moves)
+    throw CLI::ValidationError("--shutter", "nothing moves; give --velocity, or points with vx, vy, vz");
+  if (wind) result.velocity = VectorField(*wind);
+  if (velocity) {
+    VelocityArguments v = *velocity;
+    v.grid = velocityGrid;
+    result.velocity = v.field(side);
+  }
+  return result;
+}
+
+void addWispsOptions(CLI::App& app, WispsArguments& a) {
+  constexpr double any = 1e9;
+  auto* input = app.add_option("input", a.input,
+                               "Guides: points (.ply), or a mesh to scatter them on; default: in --shape.")
+                    ->type_name("FILE");
+  addOutput(app, "-o,--output", a.output, {".vdb"},
+            "Volume to write: 'density', and 'Cd' where guides have colours.")
+      ->required();
+  addOutput(app, "--points", a.points, {".ply"}, "Also write the dots as points.");
+  using On = WispsArguments::On;
+  addChoice<std::optional<On>>(
+      app, "--on", a.on, {{"vertices", On::vertices}, {"surface", On::surface}, {"volume", On::volume}},
+      "Where in the input guides are; default: surface, or vertices where there are no faces.")
+      ->needs(input);
+  using Shape = WispsArguments::Shape;
+  addChoice<Shape>(app, "--shape", a.shape,
+                   {{"ball", Shape::ball}, {"disc", Shape::disc}, {"streak", Shape::streak}},
+                   "Where guides are without an input.")
+      ->excludes(input);
+  addNumber(app, "--shape-size", a.shapeSize, 1e-6, any, "Longest side of the shape, world units.")
+      ->excludes(input);
+
+  addCount(app, "--guides", a.guideCount, 1, 100000000, "Guides to scatter.");
+  addLength(app, "--size", a.size, "Radius of a wisp, where points bring none; percent: of the input.",
+            Sign::positive);
+  addNumber(app, "--size-variation", a.sizeVariation, 0, 0.99, "Sizes vary by this share, up and down.");
+  addNumber(app, "--density", a.density, 0, any, "Mean density of a wisp, where points bring none.");
+  app.add_option_function<std::string>(
+         "--color",
+         [&a](const std::string& text) {
+           const std::string form = "R,G,B, each 0 to 1";
+           const std::vector<double> c = parseNumbers("--color", text, form);
+           if (c.size() != 3 || *std::min_element(c.begin(), c.end()) < 0 ||
+               *std::max_element(c.begin(), c.end()) > 1)
+             refuseValue("--color", text, form);
+           a.guides.standard.color = {float(c[0]), float(c[1]), float(c[2])};
+         },
+         "Colour of wisps, where points bring none.")
+      ->type_name("R,G,B")
+      ->default_str("1,1,1");
+
+  addCount(app, "--dots", a.dots, 1, 100000000, "Dots of a wisp: more are smoother, not denser.");
+  addNumber(app, "--correlation", a.correlation, 0, 1,
+            "How near a dot's random place stays to the last one's: towards 1, dots crowd along walks.");
+  addCount(app, "--walk-length", a.walkLength, 1, 100000000, "Dots after which a new walk starts.");
+  addNumber(app, "--thickness", a.thickness, 0, 1, "0: dots lie on a crumpled sheet; 1: they fill the wisp.");
+  addNumber(app, "--clump", a.clump, 0, 100, "0: dots on a sphere; small: near it; large: about its centre.");
+  addNumber(app, "--amplitude", a.amplitude, 0, 1000, "Strength of the noise that moves dots radially.");
+  addNumber(app, "--frequency", a.frequency, 1e-6, 1e6, "Its cycles along the radius of a wisp.");
+  addCount(app, "--octaves", a.octaves, 1, 16, "Noises added up, each finer and weaker.");
+  addNumber(app, "--roughness", a.roughness, 0, 10, "Strength of an octave in that of the one before.");
+  addNumber(app, "--lacunarity", a.lacunarity, 0.1, 100, "Frequency of an octave in that of the one before.");
+  addNumber(app, "--displacement", a.displacement, 0, 1000,
+            "How far dots are then moved by a vector of noises, in radii of the wisp.");
+  addNumber(app, "--displacement-frequency", a.displacementFrequency, 1e-6, 1e6, "Its cycles, likewise.");
+  addCount(app, "--displacement-octaves", a.displacementOctaves, 1, 16, "Its octaves.");
+  addNumber(app, "--displacement-roughness", a.displacementRoughness, 0, 10, "Its roughness.");
+
+  auto* resolution =
+      addCount(app, "--resolution", a.resolution, 1, 1000000, "Voxels along the longest side of the wisps.");
+  addLength(app, "--voxel-size", a.voxelSize, "Edge of a voxel, instead of --resolution.", Sign::positive)
+      ->excludes(resolution);
+  a.dotRadiusOption =
+      addLength(app, "--dot-radius", a.dotRadius,
+                "Radius of a dot; percent: of the wisps; default: 1.5 voxels, 0 with --shutter.");
+  app.add_option_function<std::string>(
+         "--velocity", [&a](const std::string& text) { parseVelocityOrWind(text, a); },
+         "Motion of dots, added to that of the points: a vector, noise, curl noise, or a grid of vectors.")
+      ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
+  app.add_option("--velocity-grid", a.velocityGrid,
+                 "Grid of the velocity file; default: v, vel, velocity, or the only one of vectors.")
+      ->type_name("NAME");
+  app.add_option_function<std::string>(
+         "--shutter",
+         [&a](const std::string& text) {
+           const std::string form = "OPEN,CLOSE in units of time, each -100 to 100, OPEN not after CLOSE";
+           const std::vector<double> n = parseNumbers("--shutter", text, form);
+           if (n.size() != 2 || n[0] > n[1] || n[0] < -100 || n[1] > 100)
+             refuseValue("--shutter", text, form);
+           a.shutterOpen = float(n[0]);
+           a.shutterClose = float(n[1]);
+         },
+         "Smear dots along their velocity, from when the shutter opens to when it closes.")
+      ->type_name("OPEN,CLOSE")
+      ->default_str("0,0");
+  addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another set of guides and wisps.");
+  app.add_flag("--half", a.halfFloat, "Write half floats.");
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/app.h"
+#include "apps/options/advect_options.h"
+#include "nephele/levelset/flow/advection_files.h"
+
+namespace nephele::apps {
+namespace {
+
+nlohmann::json stepsOf(const AdvectedGrids& result) {
+  auto steps = nlohmann::json::array();
+  for (const AdvectionStep& step : result.steps)
+    steps.push_back({{"seconds", step.seconds},
+                     {"bricks", step.bricks},
+                     {"memory_bytes", step.memoryBytes},
+                     {"folded_fraction", step.foldedShare},
+                     {"rebaked", step.rebaked}});
+  return steps;
+}
+
+void carry(const AdvectArguments& arguments, Run& run) {
+  AdvectionOptions options = arguments.resolved();
+  run.begin("read");
+  run.expect(0, 0.05);
+  const CarriedGrids input = carriedGrids(readVdbFile(arguments.input));
+  for (const std::string& grid : input.leftOut)
+    run.note(
+        fmt::format("{}: grid {} is left out: only numbers and vectors are carried", arguments.input, grid));
+  require(!input.box.isEmpty(), arguments.input + ": no grid of numbers or vectors holds anything");
+  if (!arguments.continueFrom.empty()) options.startMap = readFlowMap(arguments.continueFrom);
+  const VectorField velocity = arguments.velocity.field(input.box.longestSide());
+  run.requireMemory(estimatedAdvectionBytes(input.bricks, options),
+                    "use a larger --map-coarseness, or larger voxels in the input");
+
+  run.begin("advect");
+  run.expect(0.05, 0.9);
+  const AdvectedGrids result = advectGrids(input.bricks, velocity, options, run);
+  run.stats["steps"] = stepsOf(result);
+
+  run.begin("write");
+  const std::vector<VdbGrid> grids = toVdb(input, result.grids);
+  writeVdbFile(arguments.output, grids, run.metadata());
+  if (!arguments.map.empty()) writeVdbFile(arguments.map, toVdb(*result.map), run.metadata());
+
+  run.stats["grids"] = nlohmann::json::array();
+  for (const VdbGrid& grid : grids) {
+    const VdbGridInfo info = describe(grid);
+    run.stats["grids"].push_back({{"name", info.name}, {"active_voxels", info.activeVoxels}});
+    run.result(
+        fmt::format("{}: grid '{}', {} active voxels", arguments.output, info.name, info.activeVoxels));
+  }
+  const double folded = result.steps.empty() ? 0 : result.steps.back().foldedShare;
+  if (folded > 0.05 && !options.rebakeShare)
+    run.note(fmt::format("{:.0f} % of the map has folded; start a new one from {}", 100 * folded,
+                         arguments.output));
+}
+
+}  // namespace
+
+Verb advectVerb() {
+  const auto arguments = std::make_shared<AdvectArguments>();
+  return {"advect", "Carries the grids of a volume along with a velocity.",
+          "nephele advect cloud.vdb -o wisps.vdb --velocity curl:amplitude=0.3%,frequency=8x --steps 12",
+          [arguments](CLI::App& app) { addAdvectOptions(app, *arguments); },
+          [arguments](Run& run) { carry(*arguments, run); }};
+}
+
+}  // namespace nephele::apps

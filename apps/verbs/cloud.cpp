@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/app.h"
+#include "apps/options/cloud_options.h"
+
+namespace nephele::apps {
+namespace {
+
+std::string span(const Interval& range) {
+  return range.isPoint() ? fmt::format("{:g}", range.min) : fmt::format("{:g} to {:g}", range.min, range.max);
+}
+
+/// Says what the layers are, and which of them voxels cannot hold.
+void tellLayers(const CloudArguments& arguments, const CloudOptions& options, const Box& box,
+                const Run& run) {
+  // The absolute value doubles the frequencies of a noise, and a wave needs two voxels.
+  const double highest = 1 / (4 * double(options.voxelSize));
+  for (std::size_t i = 0; i < options.layers.size(); ++i) {
+    const CumuloLayer& layer = options.layers[i];
+    run.detail(fmt::format("layer {}: {}, frequency {:g}, amplitude {}, billow {}, billow scale {}", i + 1,
+                           arguments.noiseOf(i), layer.frequency, span(layer.amplitude.range(box)),
+                           span(layer.billow.range(box)), span(layer.billowScale.range(box))));
+    if (const float finest = layer.frequency * layer.detail; finest > highest)
+      run.note(
+          fmt::format("warning: layer {} has bumps of frequency {:g}, and voxels of {:g} hold at most {:g} "
+                      "(four voxels per wave); use fewer layers, a lower frequency, or voxels of {:g}",
+                      i + 1, finest, options.voxelSize, highest, 1 / (4 * finest)));
+  }
+}
+
+nlohmann::json layersOf(const Cloud& cloud, const CloudOptions& options, const CloudArguments& arguments,
+                        const Box& box) {
+  const auto limits = [&](const ScalarField& field) {
+    const Interval range = field.range(box);
+    return nlohmann::json{range.min, range.max};
+  };
+  auto layers = nlohmann::json::array();
+  for (std::size_t i = 0; i < cloud.layers.size(); ++i) {
+    const CumuloLayerReport& layer = cloud.layers[i];
+    layers.push_back({{"noise", arguments.noiseOf(i)},
+                      {"amplitude", layer.amplitude},
+                      {"amplitude_range", limits(options.layers[i].amplitude)},
+                      {"billow_range", limits(options.layers[i].billow)},
+                      {"billow_scale_range", limits(options.layers[i].billowScale)},
+                      {"frequency", layer.frequency},
+                      {"voxel_size", layer.voxelSize},
+                      {"active_voxels", layer.activeVoxels},
+                      {"unconverged_fraction", layer.unconvergedFraction},
+                      {"mean_displacement", layer.meanDisplacement},
+                      {"seconds", layer.seconds}});
+  }
+  return layers;
+}
+
+void growCloud(const CloudArguments& arguments, Run& run) {
+  run.expect(0, 0.02);
+  const Mesh shape = arguments.shape.shape(run);
+  FieldSources sources = arguments.sources(shape, run);
+  const CloudOptions options = arguments.resolved(sources);
+  tellLayers(arguments, options, sources.box(), run);
+  run.requireMemory(estimatedCloudBytes(shape, options),
+                    "use larger voxels (a lower --resolution or a larger --voxel-size)");
+  // Distance, layers, density and perhaps the surface.
+  run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
+  Cloud cloud = makeCloud(shape, options, run);
+  run.expect(0.9, 1, 2);
+  cloud.density = arguments.advection.carried(cloud.density, sources, arguments.seed, run);
+  run.stats["layers"] = layersOf(cloud, options, arguments, sources.box());
+  run.begin("write");
+  auto metadata = run.metadata();
+  metadata["seed"] = std::to_string(arguments.seed);
+  writeVdbFile(arguments.output, {cloud.density}, metadata);
+  if (cloud.surface) writeVdbFile(arguments.surface, {*cloud.surface}, metadata);
+  const VdbGridInfo density = describe(cloud.density);
+  run.stats["grid"] = {{"voxel_size", options.voxelSize},
+                       {"active_voxels", density.activeVoxels},
+                       {"memory_bytes", density.memoryBytes}};
+  run.result(fmt::format("{}: grid 'density', voxel size {:g}, {} active voxels", arguments.output,
+                         options.voxelSize, density.activeVoxels));
+  if (cloud.surface)
+    run.result(fmt::format("{}: grid 'surface', {} active voxels", arguments.surface,
+                           describe(*cloud.surface).activeVoxels));
+}
+
+}  // namespace
+
+Verb cloudVerb() {
+  const auto arguments = std::make_shared<CloudArguments>();
+  return {"cloud",
+          "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
+          "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x",
+          [arguments](CLI::App& app) { addCloudOptions(app, *arguments); },
+          [arguments](Run& run) { growCloud(*arguments, run); },
+          fieldValueHelp()};
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <future>
+#include <memory>
+
+#include "apps/app.h"
+#include "apps/cut_report.h"
+#include "apps/options/cut_options.h"
+#include "nephele/levelset/io/output_file.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/render/image/png_io.h"
+
+namespace nephele::apps {
+namespace {
+
+PieceSet cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Run& run) {
+  for (CutPart& part : parts) {
+    const MeshToLevelSetOptions options{.voxelSize = knives.voxelSize};
+    run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
+                      "use larger voxels (a lower --resolution or a larger --voxel-size)");
+    if (!part.level) try {
+        part.level = toBricks(meshToLevelSet(part.mesh, options, run));
+      } catch (const Cancelled&) {
+        throw;
+      } catch (const Error& error) {
+        throw Error(fmt::format("{}: {}", part.name, error.what()));
+      }
+  }
+  return cutPartsAsLevelSets(parts, knives.forLevelSets(run), run);
+}
+
+void cut(const CutArguments& arguments, Run& run) {
+  // Says now what could not be written in the end.
+  if (!arguments.preview.empty()) OutputFile{arguments.preview};
+  std::vector<CutPart> parts = arguments.readParts(run);
+  // As long as the cut itself: on the side.
+  auto crossings = std::async(std::launch::async, [mesh = arguments.isModel() ? parts[0].mesh : Mesh()] {
+    return mesh.faceCount() > 0 ? countSelfIntersections(mesh) : 0;
+  });
+  const CutKnives knives = knivesOf(arguments, parts, run);
+  const bool isExact = arguments.geometry == CutArguments::Geometry::exact;
+  const PieceSet set = isExact ? cutParts(parts, knives.exact, run) : cutAsLevelSets(parts, knives, run);
+  if (set.pieces.empty())
+    throw Error(fmt::format("no piece is left: all {} parts are smaller than --min-volume, {:g} together",
+                            set.slivers, set.sliverVolume));
+  report(set, knives, run);
+
+  run.begin("write");
+  writePieces(set, arguments.files(knives, run), run);
+  if (!arguments.preview.empty()) {
+    PiecesPictureOptions picture = arguments.picture;
+    picture.explode = arguments.explode.value_or(picture.explode);
+    writePng(arguments.preview, picturePieces(set, picture, run), {}, run.metadata());
+  }
+  reportCrossings(crossings.get(), run);
+  run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})", arguments.folder, set.pieces.size(),
+                         set.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces", set.volumeSum,
+                         set.volumeOriginal));
+}
+
+}  // namespace
+
+Verb cutVerb() {
+  const auto arguments = std::make_shared<CutArguments>();
+  return {"cut", "Cuts a model into closed pieces by knives.",
+          "nephele cut bunny.obj -o pieces --random-planes 5 --explode 0.4 --preview pieces.png",
+          [arguments](CLI::App& app) { addCutOptions(app, *arguments); },
+          [arguments](Run& run) { cut(*arguments, run); }};
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/app.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+
+namespace nephele::apps {
+namespace {
+
+struct LevelsetOptions {
+  std::string input;
+  std::string output;
+  Length voxelSize;
+  int resolution = 256;
+  MeshToLevelSetOptions conversion;
+  MeshRepairOptions repair;
+  const CLI::Option* voxelSizeOption = nullptr;
+};
+
+void bindOptions(CLI::App& app, LevelsetOptions& options) {
+  app.add_option("input", options.input, "Mesh to convert (.obj, .ply, .stl, .off, .gltf, .glb).")
+      ->required()
+      ->type_name("FILE");
+  addOutput(app, "-o,--output", options.output, {".vdb"}, "Volume to write; its grid is called 'surface'.")
+      ->required();
+  auto* resolution = addCount(app, "--resolution", options.resolution, 1, 1000000,
+                              "Voxels along the longest side of the mesh.");
+  options.voxelSizeOption = addLength(app, "--voxel-size", options.voxelSize,
+                                      "Edge of a voxel, instead of --resolution.", Sign::positive)
+                                ->excludes(resolution);
+  addNumber(app, "--half-width", options.conversion.halfWidthVoxels, 1, 1000,
+            "Voxels on either side of the surface that hold distances.");
+  addRepair(app, options.repair.mode);
+}
+
+void convert(const LevelsetOptions& options, Run& run) {
+  run.begin("read");
+  const Mesh soup = readMesh(options.input);
+  run.begin("repair");
+  const RepairedMesh repaired = repairMesh(soup, options.repair, run);
+  for (const std::string& repair : repaired.repairs) run.note(repair);
+
+  MeshToLevelSetOptions conversion = options.conversion;
+  const double longestSide = repaired.after.box.longestSide();
+  conversion.voxelSize = options.voxelSizeOption->count() > 0 ? options.voxelSize.worldUnits(longestSide)
+                                                              : longestSide / options.resolution;
+  run.requireMemory(
+      estimateLevelSetBytes(repaired.mesh, conversion),
+      "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");
+  const VdbGrid grid = meshToLevelSet(repaired.mesh, conversion, run);
+
+  run.begin("write");
+  writeVdbFile(options.output, {grid}, run.metadata());
+
+  run.begin("describe");
+  const VdbGridInfo info = describe(grid);
+  const double volume = enclosedVolume(grid);
+  run.stats["mesh"] = {{"vertices", repaired.after.vertices},
+                       {"triangles", repaired.after.triangles},
+                       {"closed", repaired.after.closed()},
+                       {"volume", repaired.after.volume}};
+  run.stats["repairs"] = repaired.repairs;
+  run.stats["grid"] = {
+      {"voxel_size", conversion.voxelSize}, {"active_voxels", info.activeVoxels}, {"volume", volume}};
+  run.result(fmt::format("{}: grid '{}', voxel size {:g}, {} active voxels, volume {:g} (mesh {:g})",
+                         options.output, info.name, conversion.voxelSize, info.activeVoxels, volume,
+                         repaired.after.volume));
+}
+
+}  // namespace
+
+Verb levelsetVerb() {
+  const auto options = std::make_shared<LevelsetOptions>();
+  return {"levelset", "Turns a closed mesh into a signed distance volume.",
+          "nephele levelset bunny.obj -o bunny.vdb --resolution 512",
+          [options](CLI::App& app) { bindOptions(app, *options); },
+          [options](Run& run) { convert(*options, run); }};
+}
+
+}  // namespace nephele::apps

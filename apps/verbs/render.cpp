@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/options/object_options.h"
+#include "apps/options/render_options.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/png_io.h"
+#include "nephele/render/scene/backdrop.h"
+
+namespace nephele::apps {
+namespace {
+
+struct RenderVerbOptions {
+  std::vector<std::string> inputs;
+  std::string output, preview, deep, holdout;
+  ObjectOptions objects;
+  PictureOptions picture;
+};
+
+void bindOptions(CLI::App& app, RenderVerbOptions& options) {
+  app.add_option("input", options.inputs,
+                 "Densities to look at (.vdb, .nvdb); where they overlap they add up.")
+      ->required()
+      ->type_name("FILE");
+  addOutput(app, "-o,--output", options.output, {".exr"}, "Picture to write: linear, premultiplied.")
+      ->required();
+  addOutput(app, "--preview", options.preview, {".png"}, "The same for the screen, before the sky.");
+  addOutput(app, "--deep", options.deep, {".exr"},
+            "The picture with depth: samples that give the picture when they are flattened.");
+  app.add_option(
+         "--holdout", options.holdout,
+         "Deep picture (.exr) of what stands in front, for the same camera: of what is behind it only "
+         "the share is kept that it lets through.")
+      ->type_name("FILE");
+  addPictureOptions(app, options.picture);
+  addShadowOutput(app, options.picture.light);
+  addObjectOptions(app, options.objects);
+}
+
+// What there is beside the volume, and depth.
+void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, const Camera& camera,
+               PictureOptions& picture, const Run& run) {
+  if (picture.pathTraced && !(options.deep.empty() && options.holdout.empty()))
+    refuseValue(options.deep.empty() ? "--holdout" : "--deep",
+                options.deep.empty() ? options.holdout : options.deep, "--integrator march");
+  options.objects.addTo(picture, volume);
+  if (!options.deep.empty()) picture.render.deep.emplace();
+  if (!options.deep.empty() && picture.adaptiveThreshold > 0)
+    refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
+  if (options.deep == options.output) refuseValue("--deep", options.deep, "another file than --output");
+  if (!options.holdout.empty())
+    picture.render.holdout = readHoldout(options.holdout, camera, run.memoryLimitBytes);
+}
+
+void renderVolume(const RenderVerbOptions& options, Run& run) {
+  const RenderVolume volume =
+      readVolumes(options.inputs, options.picture.volumes, options.picture.shutter, run);
+  if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
+  PictureOptions picture = options.picture.resolved(volume);
+  const Camera camera = picture.camera(volume);
+  addOthers(options, volume, camera, picture, run);
+  run.requireMemory(
+      double(volume.memoryBytes()) + estimateRenderBytes(volume, picture.lights, camera, picture.render),
+      "make the picture smaller (--size), or the volume with larger voxels");
+  picture.light.writeShadows(volume, picture.lights, picture.medium, run);
+  RenderResult result = picture.picture(volume, camera, run);
+  if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
+  run.begin("write");
+  auto metadata = run.metadata();
+  metadata["seed"] = std::to_string(picture.render.seed);
+  metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
+  if (result.deep)
+    writeExrPair({options.output, options.deep}, result.image, *result.deep, camera, metadata);
+  else
+    writeExr(options.output, result.image, camera, metadata);
+  if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
+
+  run.stats["rays"] = result.rays;
+  run.stats["samples"] = result.samples;
+  if (result.deep) run.stats["deep_samples"] = result.deep->sampleCount();
+  run.stats["light_seconds"] = result.lightSeconds;
+  run.stats["march_seconds"] = result.marchSeconds;
+  run.stats["extinction"] = *picture.extinction;
+  run.result(fmt::format("{}: {}x{}, extinction {:g} per world unit", options.output, camera.width(),
+                         camera.height(), *picture.extinction));
+}
+
+}  // namespace
+
+Verb renderVerb() {
+  const auto options = std::make_shared<RenderVerbOptions>();
+  return {"render", "Makes a picture of a density: a cloud, smoke, any fog volume.",
+          "nephele render cloud.vdb -o cloud.exr --preview cloud.png --view 25,5 --sun 90,38",
+          [options](CLI::App& app) { bindOptions(app, *options); },
+          [options](Run& run) { renderVolume(*options, run); }};
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "apps/app.h"
+#include "apps/options/transfer_options.h"
+#include "apps/transfer_report.h"
+#include "nephele/levelset/flow/advection_files.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/warp/warp_grid.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+#include "nephele/render/image/png_io.h"
+#include "nephele/render/image/texture_image.h"
+
+namespace nephele::apps {
+namespace {
+
+Mesh readShape(const std::string& path, Run& run) {
+  Mesh mesh = readMesh(path);
+  const MeshDiagnosis is = diagnose(mesh);
+  if (!is.closed()) run.note(path + ": is not closed: only its surface and its outside are mapped");
+  if (is.inward()) run.note(path + ": is inside out, taken the right way round");
+  return mesh;
+}
+
+/// The map in space, which grids of the distances make fast enough for millions of voxels.
+void writeWarp(const TransferArguments& arguments, const Mesh& reference, const Mesh& object,
+               MeshWarpOptions options, Run& run) {
+  if (arguments.warpFile.empty() && arguments.warpedMesh.empty()) return;
+  const Box box = boundingBox(object);
+  const double voxelSize = double(box.longestSide()) / arguments.resolution;
+  run.requireMemory(WarpBricks::estimateBytes(box, voxelSize), "use a lower --resolution");
+  options.quality = WarpQuality::fast;
+  // Grids would have to reach from one shape to the other; where that is far, distances stay exact.
+  const Box target = boundingBox(reference);
+  options.gridded =
+      options.align != Alignment::none || target.including(box).longestSide() < 3 * target.longestSide();
+  const MeshWarp warp = warpMesh(triangulated(reference), triangulated(object), options, run);
+  run.begin("warp grid");
+  // In units of the object again.
+  const WarpBricks bricks(float(1 / warp.alignment.scale) * warp.object, box, {.voxelSize = voxelSize});
+  if (!arguments.warpFile.empty()) {
+    writeVdbFile(arguments.warpFile, {toVdb(bricks.sample(warp.map, run), {.name = "rest"})}, run.metadata());
+  }
+  if (arguments.warpedMesh.empty()) return;
+  run.begin("warped mesh");
+  const Mesh mesh = marchingCubes(*bricks.sample(compose(warp.reference, warp.map), run), 0.0f, run);
+  if (mesh.faceCount() == 0)
+    throw Error(arguments.warpedMesh + ": no surface: the reference does not reach the object");
+  writeMesh(arguments.warpedMesh, mesh);
+}
+
+void transfer(const TransferArguments& arguments, Run& run) {
+  run.begin("read");
+  const Mesh reference = readShape(arguments.from, run), object = readShape(arguments.to, run);
+  const TransferOptions options = arguments.chosen(reference, object, run);
+  const auto texture =
+      arguments.texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(arguments.texture));
+
+  MeshWarpOptions warpOptions = arguments.warp;
+  warpOptions.voxelSize = double(boundingBox(reference).longestSide()) / arguments.resolution;
+  const MeshWarp warp = warpMesh(triangulated(reference), triangulated(object), warpOptions, run);
+  const Mesh result =
+      options.names.empty() ? object : transferAttributes(reference, object, warp.images, options, run);
+  run.begin("measure");
+  const TransferQuality quality = transferQuality(reference, object, warp.images, run);
+
+  writeWarp(arguments, reference, object, warpOptions, run);
+  std::shared_ptr<const Image> baked;
+  if (!arguments.bakedTexture.empty()) {
+    const BakedTexture bakedTexture =
+        bakeTexture(reference, *texture, object, warp.images, arguments.bakeOptions(*texture), run);
+    run.stats["texels_covered"] = bakedTexture.covered;
+    baked = std::make_shared<const Image>(bakedTexture.image);
+    writePng(arguments.bakedTexture, *baked, {.shoulder = 0.99999f}, run.metadata());
+  }
+  if (!arguments.preview.empty())
+    writePng(arguments.preview, pictureTransfer(reference, result, texture, baked, arguments.picture, run),
+             {}, run.metadata());
+  run.begin("write");
+  writeMesh(arguments.output, result);
+  reportTransfer(arguments.output, warp, quality, run);
+}
+
+}  // namespace
+
+Verb transferVerb() {
+  const auto arguments = std::make_shared<TransferArguments>();
+  return {"transfer", "Carries texture coordinates and other attributes from one mesh to another.",
+          "nephele transfer --from sphere.obj --to bunny.obj -o bunny_uv.obj --preview bunny.png",
+          [arguments](CLI::App& app) { addTransferOptions(app, *arguments); },
+          [arguments](Run& run) { transfer(*arguments, run); }};
+}
+
+}  // namespace nephele::apps

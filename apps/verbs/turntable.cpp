@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "apps/turntable_plan.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele::apps {
+namespace {
+
+void bindOptions(CLI::App& app, TurntableOptions& options) {
+  app.add_option("input", options.input, "Density to look at (.vdb, .nvdb).")->required()->type_name("FILE");
+  addOutput(app, "-o,--output", options.output, {".exr"},
+            "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.")
+      ->required();
+  app.add_option("--frames", options.frames,
+                 "Frames to make: 1-48, 1001-1100x2,1150. The turn takes from the first to the last of them.")
+      ->required()
+      ->type_name("FRAMES");
+  addOutput(app, "--preview", options.preview, {".png"}, "The same for the screen, named like the output.");
+  addNumber(app, "--turns", options.turns, -1000, 1000, "Turns from the first frame to the last.");
+  addChoice<Orbit>(
+      app, "--orbit", options.orbit,
+      {{"camera", Orbit::camera}, {"model", Orbit::model}, {"light", Orbit::light}},
+      "What turns: the camera around the cloud, the cloud before camera and lights, or the lights.");
+  CLI::Option* movie = addOutput(app, "--movie", options.movie, {".mp4", ".mov", ".mkv"},
+                                 "Movie of all frames, H.264; needs the program ffmpeg.");
+  addNumber(app, "--fps", options.movieOptions.framesPerSecond, 0.1, 1000, "Frames per second of the movie.")
+      ->needs(movie);
+  addOutput(app, "--contact-sheet", options.contactSheet, {".png"}, "All frames, small, on one picture.");
+  app.add_flag("--skip-existing", options.skipExisting,
+               "Keep the frames that are there and whole; without it all are made again.");
+  app.add_option("--only", options.only, "Make only those of --frames that are in this range, too.")
+      ->type_name("FRAMES");
+  app.add_option("--shard", options.shard, "Make the share of machine I of N (from 1): every N-th frame.")
+      ->type_name("I/N");
+  addPictureOptions(app, options.picture);
+  addObjectOptions(app, options.objects);
+  options.app = &app;
+}
+
+// The camera of the first frame, which frames all that any frame shows. The shutter and what it blurs come
+// later.
+Camera firstCamera(const TurntableOptions& options, const PictureOptions& picture,
+                   const RenderVolume& volume) {
+  CameraOptions camera = picture;
+  if (options.orbit != Orbit::light && !volume.isEmpty())
+    camera.framed = sweptOutline(volume.outline(), volume.worldBounds().center());
+  if (camera.file.empty()) {
+    camera.shutter = {};
+    camera.volumeMotion.reset();
+  }
+  return camera.camera(volume);
+}
+
+void makeTurntable(const TurntableOptions& options, Run& run) {
+  if (options.turns == 0) refuseValue("--turns", "0", "a number from -1000 to 1000 that is not 0");
+  TurntablePlan plan(options);
+  if (plan.frames.empty()) return run.note("no frame of --frames is in this share; nothing to do");
+  run.expect(0, 0.05, 4);
+  prepareFolders(options, plan);
+  const RenderVolume volume =
+      readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
+  if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
+  PictureOptions picture = options.picture.resolved(volume);
+  options.objects.addTo(picture, volume);
+  const Camera start = firstCamera(options, picture, volume);
+  const int width = start.window().width(), height = start.window().height();
+  // Moving lights are made while those of the frame before are still there.
+  const double bytes = estimateRenderBytes(volume, picture.lights, start, picture.render);
+  run.requireMemory(double(volume.memoryBytes()) + (options.orbit == Orbit::camera ? 1 : 2) * bytes,
+                    "make the picture smaller (--size), or the volume with larger voxels");
+  if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
+  if (options.skipExisting) skipExisting(plan, start, run);
+  makeFrames(plan, options, picture, volume, start, run);
+  makeMovieAndSheet(plan, options, picture, run);
+
+  for (const TurntableFrame& frame : plan.frames)
+    run.stats["frames"].push_back(
+        {{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}});
+  run.stats["extinction"] = *picture.extinction;
+  run.result(fmt::format("{}: {} frames, {} of them skipped, {}x{}, extinction {:g} per world unit",
+                         options.output, plan.frames.size(),
+                         std::ranges::count_if(plan.frames, &TurntableFrame::skipped), width, height,
+                         *picture.extinction));
+}
+
+}  // namespace
+
+Verb turntableVerb() {
+  const auto options = std::make_shared<TurntableOptions>();
+  return {"turntable", "Makes the frames of a turn around a density, and a movie of them.",
+          "nephele turntable cloud.vdb -o frames/cloud.####.exr --frames 1-48 --movie cloud.mp4",
+          [options](CLI::App& app) { bindOptions(app, *options); },
+          [options](Run& run) { makeTurntable(*options, run); }};
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,143 @@
+// The way from a mesh to a cloud: base distance, layers, density; each part lives in its own file.
+#include "nephele/levelset/cloud/cloud.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+
+namespace {
+
+bool isVolumeFile(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
+  return extension == ".vdb" || extension == ".nvdb";
+}
+
+Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
+  const VdbGrid grid = readScalarGrid(path);
+  const VdbGridInfo info = describe(grid);
+  require(info.gridClass == VdbGridInfo::Class::levelSet,
+          path + ": grid '" + info.name + "' is not a level set; a cloud grows on a mesh or on a level set");
+  Mesh mesh = marchingCubes(*toBricks(grid), 0.0f, progress);
+  require(mesh.faceCount() > 0, path + ": grid '" + info.name + "' has no surface");
+  return mesh;
+}
+
+/// Where the last layer is coarser than the result, so may the base be; its own detail shows between the
+/// bumps, so not by much.
+float baseVoxelSize(const std::vector<CumuloLayer>& layers, float voxelSize) {
+  constexpr float kMostVoxels = 2;
+  return std::clamp(cumuloVoxelSize(layers, layers.size() - 1, voxelSize), voxelSize,
+                    kMostVoxels * voxelSize);
+}
+
+/// The share of the box, in level slices, in which `factor` is not one number, so that voxels are stored.
+double varyingShare(const ScalarField& factor, const Box& box) {
+  constexpr int kSlices = 32;
+  int varying = 0;
+  for (int i = 0; i < kSlices; ++i) {
+    Box slice = box;
+    slice.min.y = box.min.y + box.size().y * float(i) / kSlices;
+    slice.max.y = box.min.y + box.size().y * float(i + 1) / kSlices;
+    varying += !factor.range(slice).isPoint();
+  }
+  return double(varying) / kSlices;
+}
+
+double square(double x) {
+  return x * x;
+}
+
+float thickestEdge(const CloudOptions& options) {
+  const float thickest = options.edgeThickness.range(Box::everywhere()).max;
+  require(std::isfinite(thickest), "makeCloud: edgeThickness has no finite range");
+  return thickest;
+}
+
+}  // namespace
+
+Mesh cloudShapeMesh(const CloudShapeOptions& options, const Progress& progress) {
+  // Fine enough that facets are lost beside the first layer of bumps on any cloud.
+  constexpr float kVoxels = 96;
+  const CloudShape shape = cloudShape(options);
+  const float voxel = options.size / kVoxels;
+  return marchingCubes(
+      *bakeGrid(shape.level,
+                {.voxelSize = voxel, .box = shape.box.expanded(2 * voxel), .band = {-2 * voxel, 2 * voxel}},
+                progress),
+      0.0f, progress);
+}
+
+RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
+  return repairMesh(isVolumeFile(path) ? surfaceOfLevelSet(path, progress) : readMesh(path), repair,
+                    progress);
+}
+
+Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+  require(options.voxelSize > 0,
+          "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  require(!options.layers.empty(), "makeCloud: there must be at least one layer");
+  const std::vector<CumuloLayer>& layers = options.layers;
+  const float edge = thickestEdge(options) / 2;
+  progress.begin("distance");
+  const ScalarField base = meshDistance(mesh,
+                                        {.voxelSize = baseVoxelSize(layers, options.voxelSize),
+                                         .exteriorBand = cumuloExteriorBand(layers, options.voxelSize, edge),
+                                         .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)},
+                                        progress);
+  GriddedCumulo cumulo = griddedCumulo(base, layers,
+                                       {.voxelSize = options.voxelSize,
+                                        .box = boundingBox(mesh),
+                                        .newtonSteps = options.newtonSteps,
+                                        .edge = edge,
+                                        .closestPoint = closestPoint(mesh),
+                                        .medialSmoothing = options.medialSmoothing,
+                                        .renormalise = options.renormalise},
+                                       progress);
+  Cloud cloud{cloudDensity(cumulo,
+                           {.voxelSize = options.voxelSize,
+                            .edgeThickness = options.edgeThickness,
+                            .edgeExponent = options.edgeExponent,
+                            .factor = options.densityFactor,
+                            .halfFloat = options.halfFloat},
+                           progress),
+              {},
+              std::move(cumulo.layers)};
+  if (options.withSurface)
+    cloud.surface = cloudSurface(cumulo, options.voxelSize, options.halfFloat, progress);
+  return cloud;
+}
+
+double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
+  // Measured, bytes: the program itself; the mesh and what finds its closest points, per face; the distance
+  // to it, per voxel of its area; and both while they are made. The result stores leaves of 8 voxels on an
+  // edge that layers make larger.
+  constexpr double kProgram = 4.8e7, kFace = 160, kFaceWork = 330, kBase = 150, kBaseWork = 320, kLeaf = 8;
+  constexpr double kGrowth = 1.5, kCaution = 1.1;
+  require(!options.layers.empty(), "estimatedCloudBytes: there must be at least one layer");
+  const double area = surfaceArea(mesh), voxel = options.voxelSize;
+  const double baseVoxels = area / square(double(baseVoxelSize(options.layers, options.voxelSize)));
+  const double grids = options.withSurface ? 2 : 1;
+  const double varying =
+      std::abs(signedVolume(mesh)) * varyingShare(options.densityFactor, boundingBox(mesh));
+  const CumuloBytes layers = estimatedCumuloBytes(options.layers, options.voxelSize, area, boundingBox(mesh));
+  const double growth = std::min(1.45 + 0.17 * double(options.layers.size()), 2.2);
+  const double stored = growth * (kLeaf + double(thickestEdge(options)) / voxel) * grids;
+  const double result =
+      sizeof(float) * (area * stored / square(voxel) + kGrowth * varying / (voxel * voxel * voxel));
+  const double faces = double(mesh.faceCount());
+  const double making = kFaceWork * faces + kBaseWork * baseVoxels;
+  const double base = kFace * faces + kBase * baseVoxels;
+  return kCaution * (kProgram + std::max({making, base + layers.peak, base + layers.kept + result}));
+}
+
+}  // namespace nephele

@@ -1,0 +1,309 @@
+// Works strip by strip, each an octree from blocks of 32^3 voxels down to leaves of 8^3. A sampled estimate
+// of the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's
+// error is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum.
+// Leaves go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would
+// hold every value almost three times.
+//
+// Limits: at a crease of the surface the estimate can be off by more than its stated error; the voxels
+// concerned then differ by less than an edge thickness in position.
+#include "nephele/levelset/cloud/cloud_density.h"
+
+#include <openvdb/tools/Prune.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr int kLeaf = int(Leaf::DIM);
+constexpr int kBlock = 32;
+constexpr int kLevelSetHalfWidth = 3;
+
+/// What values of l become in the file.
+class DensityRule {
+ public:
+  DensityRule(const ScalarField& edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
+  /// Values of l in `box` at and beyond whose ends the file's values do not change.
+  Interval band(const Box& box) const {
+    const float edge = edge_.range(box).max;
+    return {-edge / 2, edge / 2};
+  }
+  DensityRule restrictedTo(const Box& box) const { return {edge_.restrictedTo(box), exponent_}; }
+  void apply(const PointSpans& points, std::span<float> l) const {
+    std::array<float, Leaf::SIZE> edge;
+    edge_.eval(points, std::span<float>(edge));
+    for (std::size_t i = 0; i < l.size(); ++i) l[i] = value(l[i], edge[i]);
+  }
+  bool isActive(float value) const { return value > 0; }
+  float background() const { return 0; }
+  float inside() const { return 1; }
+
+ private:
+  float value(float l, float edge) const {
+    const float t = std::clamp(l / edge + 0.5f, 0.0f, 1.0f);
+    if (exponent_) return *exponent_ == 1 ? t : std::pow(t, *exponent_);
+    return t * t * (3 - 2 * t);
+  }
+
+  ScalarField edge_;
+  std::optional<float> exponent_;
+};
+
+class LevelSetRule {
+ public:
+  explicit LevelSetRule(float halfWidth) : halfWidth_(halfWidth) {}
+  Interval band(const Box&) const { return {-halfWidth_, halfWidth_}; }
+  LevelSetRule restrictedTo(const Box&) const { return *this; }
+  void apply(const PointSpans&, std::span<float> l) const {
+    for (float& value : l) value = -std::clamp(value, -halfWidth_, halfWidth_);
+  }
+  bool isActive(float value) const { return std::abs(value) < halfWidth_; }
+  float background() const { return halfWidth_; }
+  float inside() const { return -halfWidth_; }
+
+ private:
+  float halfWidth_;
+};
+
+/// What one block of the octree came to.
+struct Block {
+  struct Tile {
+    openvdb::Coord origin;
+    float value;
+  };
+  std::vector<std::unique_ptr<Leaf>> leaves;
+  std::vector<Tile> tiles;
+};
+
+template <class Rule>
+class TreeBuilder {
+ public:
+  TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor)
+      : cloud_(cloud),
+        voxel_(voxelSize),
+        rule_(rule),
+        factor_(factor),
+        box_(cloud.box.expanded(rule.band(Box::everywhere()).max)) {}
+
+  openvdb::FloatTree::Ptr build(const Progress& progress) const {
+    const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
+    const Vec3f low = box_.min, high = box_.max;
+    const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
+    const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
+    auto tree = std::make_shared<openvdb::FloatTree>(rule_.background());
+    const int width = stripWidth(), strips = (count.y + width - 1) / width;
+    for (int i = 0; i < count.z * strips; ++i) {
+      const int y = i % strips * width;
+      const Vec3i strip{count.x, std::min(width, count.y - y), 1};
+      addStrip(first + Vec3i{0, y, i / strips}, strip, *tree, progress);
+      progress.advance(double(i + 1) / (count.z * strips));
+    }
+    openvdb::tools::pruneTiles(*tree);
+    return tree;
+  }
+
+ private:
+  /// Blocks along y whose estimate is sampled at a time: so many that little of it is sampled twice.
+  int stripWidth() const {
+    constexpr float kBricks = 16;
+    return std::max(
+        1, int(std::ceil(kBricks * BrickGrid::kBrick * cloud_.estimateVoxelSize / (float(kBlock) * voxel_))));
+  }
+
+  /// Adds the blocks from `corner` on.
+  void addStrip(const Vec3i& corner, const Vec3i& count, openvdb::FloatTree& tree,
+                const Progress& progress) const {
+    const ScalarField estimate = sampledEstimate(corner, count);
+    std::vector<Block> blocks(std::size_t(count.x) * std::size_t(count.y));
+    parallelFor(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b) {
+        progress.check();
+        const Vec3i block = (corner + Vec3i{int(b) % count.x, int(b) / count.x, 0}) * kBlock;
+        const Box box = boxOfVoxels(block, {kBlock, kBlock, kBlock});
+        split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, blocks[b]);
+      }
+    });
+    move(blocks, tree);
+  }
+
+  Box boxOfVoxels(const Vec3i& first, const Vec3i& count) const {
+    return {Vec3f(first) * voxel_, Vec3f(first + count - Vec3i{1, 1, 1}) * voxel_};
+  }
+
+  /// The estimate over some blocks, on a grid: one strip at a time keeps it small beside the cloud's own
+  /// grids.
+  ScalarField sampledEstimate(const Vec3i& firstBlock, const Vec3i& blocks) const {
+    const float margin = 2 * cloud_.estimateVoxelSize;
+    // A voxel more than the blocks' own, so that even a cloud that lies between two voxels leaves some box.
+    const Box around = boxOfVoxels(firstBlock * kBlock, blocks * kBlock).expanded(margin + voxel_);
+    const Interval settled = settledBand(rule_.band(around));
+    return bake(cloud_.estimate, {.voxelSize = cloud_.estimateVoxelSize,
+                                  .box = around.intersection(box_.expanded(margin)),
+                                  .band = {settled.min - margin, settled.max + margin}});
+  }
+
+  /// Estimates beyond whose ends the exact value of l lies beyond those of `band`.
+  Interval settledBand(const Interval& band) const {
+    return {band.min - cloud_.estimateError, band.max + cloud_.estimateError};
+  }
+
+  /// What blocks are read from.
+  struct Source {
+    ScalarField estimate, factor;
+    Rule rule;
+  };
+
+  void split(const Vec3i& first, int width, const Source& source, Block& block) const {
+    const Box box = boxOfVoxels(first, {width, width, width});
+    const Interval l = source.estimate.range(box), band = source.rule.band(box), settled = settledBand(band);
+    if (l.max <= settled.min) return;
+    const Interval factor = source.factor.range(box);
+    if (factor == Interval::of(0)) return;
+    if (l.min >= settled.max && factor.isPoint()) {
+      for (int z = 0; z < width; z += kLeaf)
+        for (int y = 0; y < width; y += kLeaf)
+          for (int x = 0; x < width; x += kLeaf)
+            block.tiles.push_back({{first.x + x, first.y + y, first.z + z}, rule_.inside() * factor.min});
+      return;
+    }
+    if (width == kLeaf) return evaluate(first, source, {band, settled, l.min >= settled.max, factor}, block);
+    const int half = width / 2;
+    for (int i = 0; i < 8; ++i)
+      split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, source, block);
+  }
+
+  /// What is known about a leaf by ranges.
+  struct Known {
+    Interval band, settled;
+    bool isInside;
+    Interval factor;
+  };
+
+  void evaluate(const Vec3i& first, const Source& source, const Known& known, Block& block) const {
+    constexpr int kCount = int(Leaf::SIZE);
+    std::array<float, kCount> x, y, z, l;
+    for (int i = 0; i < kCount; ++i) {
+      // Leaves run along z fastest.
+      x[i] = float(first.x + (i >> 6)) * voxel_;
+      y[i] = float(first.y + (i >> 3 & 7)) * voxel_;
+      z[i] = float(first.z + (i & 7)) * voxel_;
+    }
+    if (known.isInside)
+      l.fill(known.settled.max);
+    else
+      source.estimate.eval({x, y, z}, std::span<float>(l));
+
+    std::array<float, kCount> nearX, nearY, nearZ, exact;
+    std::array<int, kCount> place;
+    std::size_t count = 0;
+    for (int i = 0; i < kCount; ++i) {
+      if (l[i] <= known.settled.min || l[i] >= known.settled.max) continue;
+      nearX[count] = x[i];
+      nearY[count] = y[i];
+      nearZ[count] = z[i];
+      place[count++] = i;
+    }
+    if (count > 0) {
+      const auto part = [&](std::array<float, kCount>& a) { return std::span<float>(a).first(count); };
+      cloud_.surface.eval({part(nearX), part(nearY), part(nearZ)}, part(exact));
+      for (std::size_t i = 0; i < count; ++i) l[std::size_t(place[i])] = exact[i];
+    }
+
+    bool inside = true, outside = true;
+    for (const float value : l) {
+      inside &= value >= known.band.max;
+      outside &= value <= known.band.min;
+    }
+    const openvdb::Coord origin(first.x, first.y, first.z);
+    if (inside && known.factor.isPoint()) block.tiles.push_back({origin, rule_.inside() * known.factor.min});
+    if ((inside && known.factor.isPoint()) || outside) return;
+    source.rule.apply({x, y, z}, std::span<float>(l));
+    std::array<float, kCount> factor;
+    if (known.factor.isPoint())
+      factor.fill(known.factor.min);
+    else
+      source.factor.eval({x, y, z}, std::span<float>(factor));
+    auto leaf = std::make_unique<Leaf>(origin, rule_.background(), false);
+    for (int i = 0; i < kCount; ++i) {
+      const float value = l[i] * factor[i];
+      leaf->buffer().setValue(openvdb::Index(i), value);
+      leaf->setActiveState(openvdb::Index(i), rule_.isActive(value));
+    }
+    block.leaves.push_back(std::move(leaf));
+  }
+
+  /// Puts what `blocks` hold into `tree`.
+  void move(std::vector<Block>& blocks, openvdb::FloatTree& tree) const {
+    openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor(tree);
+    for (Block& block : blocks) {
+      for (const Block::Tile& tile : block.tiles)
+        accessor.addTile(1, tile.origin, tile.value, rule_.isActive(tile.value));
+      for (std::unique_ptr<Leaf>& leaf : block.leaves) accessor.addLeaf(leaf.release());
+    }
+  }
+
+  const GriddedCumulo& cloud_;
+  float voxel_;
+  Rule rule_;
+  ScalarField factor_;
+  /// Where the edge can be.
+  Box box_;
+};
+
+template <class Rule>
+VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor,
+                  const VdbGridLabel& label, const Progress& progress) {
+  detail::initializeOpenVdb();
+  detail::releaseFreed();
+  auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule, factor).build(progress));
+  grid->setName(label.name);
+  grid->setGridClass(label.gridClass == VdbGridInfo::Class::levelSet ? openvdb::GRID_LEVEL_SET
+                                                                     : openvdb::GRID_FOG_VOLUME);
+  grid->setSaveFloatAsHalf(label.halfFloat);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(double(voxelSize)));
+  return detail::wrapGrid(grid);
+}
+
+}  // namespace
+
+VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                     const Progress& progress) {
+  require(options.voxelSize > 0,
+          "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  const Interval edge = options.edgeThickness.range(Box::everywhere());
+  require(edge.min > 0 && std::isfinite(edge.max),
+          "cloudDensity: edgeThickness must be > 0 and finite, got " +
+              std::to_string(edge.min > 0 ? edge.max : edge.min));
+  require(!options.edgeExponent || (*options.edgeExponent > 0 && std::isfinite(*options.edgeExponent)),
+          "cloudDensity: edgeExponent must be > 0, got " + std::to_string(options.edgeExponent.value_or(0)));
+  const Interval factor = options.factor.range(cloud.box);
+  require(factor.min >= 0,
+          "cloudDensity: the factor must not be negative, got values from " + std::to_string(factor.min));
+  progress.begin("density");
+  return buildGrid(cloud, options.voxelSize, DensityRule(options.edgeThickness, options.edgeExponent),
+                   options.factor, {"density", VdbGridInfo::Class::fogVolume, options.halfFloat}, progress);
+}
+
+VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat, const Progress& progress) {
+  require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
+  progress.begin("surface");
+  return buildGrid(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize), 1.0f,
+                   {"surface", VdbGridInfo::Class::levelSet, halfFloat}, progress);
+}
+
+}  // namespace nephele

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <optional>
+
+#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/io/vdb_io.h"
+
+namespace nephele {
+
+struct CloudDensityOptions {
+  /// World units, > 0. Voxel centres lie at integer multiples of it.
+  float voxelSize = 0.0f;
+  /// Width in world units, > 0 and bounded, over which the density rises from 0 to 1, half of it to either
+  /// side of the surface.
+  ScalarField edgeThickness{0.0f};
+  /// How the density rises over the edge: t^edgeExponent, t from 0 to 1 over its width; 1 is linear, more is
+  /// a thinner rim. > 0. Empty: t t (3 - 2 t).
+  std::optional<float> edgeExponent{};
+  /// Multiplies the density; nowhere negative. See modeling/cloud/density_profile.h.
+  ScalarField factor{1.0f};
+  bool halfFloat = false;
+};
+
+/// The cloud as fog: grid `density`, class fog volume, background 0.
+///
+/// The value is smoothstep(-edge / 2, edge / 2, l): 1 inside, 0 outside, 1/2 on the surface; or the power of
+/// t that the options ask for; times the factor. l is not a distance but grows faster than one, so the edge
+/// is as thick as stated or thinner, at any voxel size; an edge thicker than 6 voxels needs
+/// CumuloGridOptions::edge. Inner bricks are tiles where the factor's range is a single value. Cost grows
+/// with the bricks that the edge crosses and those in which the factor varies. All cores; the same bits at
+/// any thread count.
+/// @throws Error if a length or the exponent is not > 0, or the factor can be negative; Cancelled.
+VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                     const Progress& progress = silent());
+
+/// The displaced level set: grid `surface`, class level set, negative inside as files are, 3 voxels to either
+/// side.
+///
+/// Its values are -l where |l| < 3 voxels. The zero surface is exact; away from it |l| grows faster than the
+/// distance (1.2 to 1.8 times), as l is a sum of displacements and not a distance.
+/// @throws Error if voxelSize is not > 0; Cancelled.
+VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat,
+                     const Progress& progress = silent());
+
+}  // namespace nephele

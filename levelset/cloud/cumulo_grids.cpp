@@ -1,0 +1,633 @@
+// A layer is baked twice: its signed displacement, at 1/16 of its shortest wave, and the sum so far, as the
+// next layer finds its surface points on. Both are interpolated with Catmull-Rom cubics, whose exact gradient
+// is continuous and whose error at that rate is a few ten-thousandths of the amplitude; trilinear
+// interpolation would need four times as many samples per axis for that.
+//
+// The result is never read from a sum that was sampled: it adds the base, in its full detail, and each
+// layer's own grid. Only surface points come from the sampled sums, where an error moves a bump along the
+// surface, not the surface.
+//
+// Source: Tessendorf, Resolution Independent Volumes, 3.3.3, "Selectively sampling the levelset into grids".
+// Limits: base features thinner than two voxels of a layer's grid are not seen by the layers after it.
+#include "nephele/levelset/cloud/cumulo_grids.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "nephele/levelset/cloud/medial_smoothing.h"
+#include "nephele/levelset/cloud/renormalise.h"
+#include "nephele/levelset/grid/brick_memo.h"
+#include "nephele/levelset/grid/brick_samples.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/cloud/surface_point.h"
+#include "nephele/modeling/field/operations.h"
+
+namespace nephele {
+
+namespace {
+
+using detail::BrickSamples;
+using detail::Packing;
+
+/// Samples per wave of the finest noise: of layers that others build on, of the last one, and the least.
+constexpr float kSamplesPerWave = 16;
+constexpr float kSamplesPerLastWave = 12;
+constexpr float kFewestSamplesPerWave = 8;
+/// Jumps are smoothed over at least this many voxels of a layer's grid to either side: fewer leave edges too
+/// steep.
+constexpr int kLeastDilation = 2;
+/// A layer's band is this many of its voxels wider on either side than where its displacement matters.
+constexpr float kMarginVoxels = 4;
+/// Largest slope of Perlin noise, in units of its bound times its frequency.
+constexpr float kLargestSlope = 3.2f;
+/// How far the sampled sum may be off at a crease, in voxels of its grid.
+constexpr float kEstimateErrorVoxels = 1.0f;
+/// A surface point counts as found within this many voxels.
+constexpr float kFoundVoxels = 0.1f;
+/// Bricks of a part in which surface points are searched for once more, to count those that were not found,
+/// and of how many samples there one is. Misses come in clusters: few samples of many bricks count better.
+constexpr std::size_t kSearchedBricks = 512;
+constexpr std::size_t kSearchedShare = 4;
+/// A layer with no more positions of bricks than this is baked in one piece: some hundred megabytes.
+constexpr double kWholePositions = 1 << 20;
+/// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
+/// copy less from their neighbours.
+constexpr int kPartBricks = 8;
+constexpr double kPartPositions = 1 << 18;
+/// Of a layer's time, the rest being spent on the sum for the next one.
+constexpr double kShareOfBake = 0.85;
+constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+
+/// Width kept on either side of the band of a layer. Displacement ends at three quarters of it.
+float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, const CumuloGridOptions& options) {
+  const float voxel = cumuloVoxelSize(layers, index, options.voxelSize);
+  return std::max(kMarginVoxels * voxel, options.edge * 4 / 3 + voxel);
+}
+
+/// Of the displacement of a layer, where it does not jump.
+float largestSlope(const CumuloStep& step) {
+  const CumuloLayer& layer = *step.layer;
+  if (layer.steepest) return *layer.steepest * layer.amplitude.range(Box::everywhere()).max;
+  return kLargestSlope * step.bound * layer.frequency;
+}
+
+float coarsestVoxel(const std::vector<CumuloLayer>& layers, float voxelSize) {
+  float coarsest = voxelSize;
+  for (std::size_t i = 0; i < layers.size(); ++i)
+    coarsest = std::max(coarsest, cumuloVoxelSize(layers, i, voxelSize));
+  return coarsest;
+}
+
+/// l_i to be baked at the voxels of the layer's own grid: l_{i-1} where the layer was not evaluated, read
+/// from its cheap form, and the full sum elsewhere.
+class GrownNode final : public FieldNode<float> {
+ public:
+  GrownNode(const ScalarField& before, const ScalarField& level, const ScalarField& displacement)
+      : before_(before.node()), level_(level.node()), displacement_(displacement.node()) {}
+
+  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
+    Scratch::Frame frame(scratch);
+    float* grown = frame.lane();
+    displacement_->eval(points, {grown}, scratch);
+    if (before_ == level_) {
+      level_->eval(points, values, scratch);
+      for (int i = 0; i < points.count; ++i) values[0][i] += std::abs(grown[i]);
+      return;
+    }
+    const BlockLanes<3> where = frame.lanes<3>();
+    std::array<std::uint8_t, kBlockSize> origin;
+    int count = 0;
+    for (int i = 0; i < points.count; ++i) {
+      if (grown[i] == 0) continue;
+      where[0][count] = points.x[i];
+      where[1][count] = points.y[i];
+      where[2][count] = points.z[i];
+      origin[count++] = static_cast<std::uint8_t>(i);
+    }
+    if (count < points.count) level_->eval(points, values, scratch);
+    if (count == 0) return;
+    float* before = frame.lane();
+    before_->eval(scratch.pointBlock(where, count), {before}, scratch);
+    for (int i = 0; i < count; ++i) values[0][origin[i]] = before[i] + std::abs(grown[origin[i]]);
+  }
+
+  Interval range(const Box& box) const override {
+    const Interval grown = displacement_->range(box);
+    return (grown.isPoint() ? level_->range(box) : before_->range(box)) + abs(grown);
+  }
+
+ private:
+  NodePtr<float> before_, level_, displacement_;
+};
+
+/// The displacement of a layer for a bake that leaves out what cannot matter: its range is 0 where amplitudes
+/// near by are too small for this layer and those after it to bring the sum to the surface.
+class NeededNode final : public FieldNode<float> {
+ public:
+  NeededNode(const CumuloStep& step, const std::vector<CumuloLayer>& layers, float voxelSize)
+      : displacement_(step.displacement.node()),
+        level_(step.level.node()),
+        reach_(step.reach),
+        margin_(step.margin),
+        voxelSize_(voxelSize) {
+    for (std::size_t i = step.index; i < layers.size(); ++i) {
+      heights_.push_back({layers[i].amplitude.node(), layers[i].noise.range(Box::everywhere()).magnitude()});
+      leastReach_ += layers[i].amplitude.range(Box::everywhere()).min * heights_.back().noiseBound;
+    }
+  }
+
+  static bool isOfUse(const CumuloStep& step, const std::vector<CumuloLayer>& layers) {
+    return std::any_of(
+        layers.begin() + std::ptrdiff_t(step.index), layers.end(),
+        [](const CumuloLayer& layer) { return !layer.amplitude.range(Box::everywhere()).isPoint(); });
+  }
+
+  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
+    displacement_->eval(points, values, scratch);
+  }
+
+  Interval range(const Box& box) const override {
+    const Interval range = displacement_->range(box);
+    if (range.isPoint()) return range;
+    const Interval level = level_->range(box);
+    const float missing = -level.max - detail::kOuterShare * margin_;
+    // Wherever amplitudes are read from.
+    if (level.max > 0 || leastReach_ >= missing) return range;
+    // Levels rise from layer to layer: no later surface point is farther.
+    const float depth = std::min(-level.min, reach_ + margin_);
+    const Box near = box.expanded(detail::farthestSurfacePoint(depth, voxelSize_));
+    // Amplitudes in a box can take a search: the first often tell.
+    float reach = 0;
+    for (const Height& height : heights_) {
+      reach += height.amplitude->range(near).max * height.noiseBound;
+      if (reach >= missing) return range;
+    }
+    return Interval::of(0);
+  }
+
+ private:
+  struct Height {
+    NodePtr<float> amplitude;
+    float noiseBound;
+  };
+
+  NodePtr<float> displacement_, level_;
+  std::vector<Height> heights_;
+  float reach_, margin_, voxelSize_;
+  /// What the layers add at least where their noise is largest.
+  float leastReach_ = 0;
+};
+
+/// Bricks begin <= z < end.
+struct Slab {
+  int begin, end;
+
+  bool contains(int z) const { return z >= begin && z < end; }
+};
+
+/// How a layer is cut into parts.
+struct Parts {
+  Slab all;
+  int thickness, halo;
+
+  int count() const { return (all.end - all.begin + thickness - 1) / thickness; }
+  Slab operator[](int part) const {
+    return {all.begin + part * thickness, std::min(all.begin + (part + 1) * thickness, all.end)};
+  }
+  /// A part with its neighbours as far as they can reach it through the smoothing.
+  Slab around(int part) const {
+    const Slab own = (*this)[part];
+    return {std::max(own.begin - halo, all.begin), std::min(own.end + halo, all.end)};
+  }
+};
+
+/// The layout of a layer's grid at the bricks of `slab` inside a box, without bricks.
+BrickSamples noSamples(const Box& box, float voxelSize, const Slab& slab) {
+  BrickSamples samples;
+  samples.voxelSize = voxelSize;
+  for (int axis = 0; axis < 3; ++axis) {
+    samples.places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+    samples.places.count[axis] =
+        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.places.first[axis];
+  }
+  samples.places.first.z = slab.begin;
+  samples.places.count.z = slab.end - slab.begin;
+  samples.table.resize(samples.places.size());
+  detail::SampleStore background(BrickSamples::kCount);
+  samples.pool.push_back(background.data());
+  samples.ranges.push_back(Interval::of(0));
+  samples.stores.push_back({std::move(background), std::numeric_limits<int>::max()});
+  return samples;
+}
+
+/// `reach` is how far smoothing sees, in voxels.
+Parts partsOf(const Box& box, float voxelSize, int reach) {
+  const auto bricks = [&](int axis) {
+    return Slab{int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1,
+                int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2};
+  };
+  const auto size = [&](int axis) { return bricks(axis).end - bricks(axis).begin; };
+  const double across = double(size(0)) * size(1);
+  Parts parts{bricks(2), size(2), 1 + (reach + 1 + BrickGrid::kAfter) / BrickGrid::kBrick};
+  if (across * size(2) > kWholePositions)
+    parts.thickness = std::max({kPartBricks, parts.halo, int(kPartPositions / across)});
+  return parts;
+}
+
+/// A slab of a layer as it was sampled, with samples beside it that are of no use.
+struct Part {
+  Slab slab;
+  BrickSamples samples;
+};
+
+/// Copies of the bricks of `slab` from those of neighbouring parts.
+BrickSamples windowOf(const std::deque<Part>& parts, const Slab& slab, const Box& box, float voxelSize) {
+  /// Bricks along z that are given back together.
+  constexpr int kStoreBricks = 8;
+  BrickSamples window = noSamples(box, voxelSize, slab);
+  for (int z = slab.begin; z < slab.end; z += kStoreBricks) {
+    std::vector<Vec3i> bricks;
+    std::vector<const float*> sources;
+    for (const Part& part : parts) {
+      const Vec3i first = max(window.places.first, part.samples.places.first);
+      const Vec3i end = min(window.places.first + window.places.count,
+                            part.samples.places.first + part.samples.places.count);
+      const int lastZ = std::min({z + kStoreBricks, end.z, part.slab.end});
+      Vec3i b;
+      for (b.z = std::max({z, first.z, part.slab.begin}); b.z < lastZ; ++b.z)
+        for (b.y = first.y; b.y < end.y; ++b.y)
+          for (b.x = first.x; b.x < end.x; ++b.x) {
+            const std::int32_t pool = part.samples.poolIndex(b);
+            if (pool == 0) continue;
+            bricks.push_back(b);
+            sources.push_back(part.samples.pool[std::size_t(pool)]);
+          }
+    }
+    const std::size_t before = window.pool.size();
+    window.append(bricks);
+    parallelFor(bricks.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        float* copy = window.pool[before + i];
+        std::copy_n(sources[i], BrickSamples::kCount, copy);
+        window.ranges[before + i] = rangeOfSamples({copy, std::size_t(BrickSamples::kCount)});
+      }
+    });
+  }
+  return window;
+}
+
+/// Work that is a part of a stage: from one share of it to another.
+class ShareOfProgress final : public Progress {
+ public:
+  ShareOfProgress(const Progress& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
+
+  void advance(double fraction) const override { whole_.advance(from_ + (to_ - from_) * fraction); }
+  void note(std::string_view message) const override { whole_.note(message); }
+  bool cancelled() const override { return whole_.cancelled(); }
+
+ private:
+  const Progress& whole_;
+  double from_, to_;
+};
+
+class LayerSampler {
+ public:
+  LayerSampler(const std::vector<CumuloLayer>& layers, const CumuloGridOptions& options,
+               const Progress& progress)
+      : layers_(layers), options_(options), progress_(progress), reach_(displacementBound(layers)) {}
+
+  CumuloSampled operator()(const CumuloStep& step) {
+    const auto start = std::chrono::steady_clock::now();
+    progress_.begin("layer " + std::to_string(step.index + 1));
+    const float voxel = cumuloVoxelSize(layers_, step.index, options_.voxelSize);
+    const std::shared_ptr<BrickGrid> grid = bakeLayer(step, voxel);
+
+    const ScalarField displacement = gridField(grid, Interpolation::tricubic);
+    CumuloSampled sampled{displacement, step.before + abs(displacement), 0.0f, 0.0f};
+    prepareNext(step, grid, sampled);
+    reports.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    progress_.count("active_voxels", double(reports.back().activeVoxels));
+    return sampled;
+  }
+
+  std::vector<CumuloLayerReport> reports;
+  ScalarField estimate{0.0f};
+  float estimateVoxelSize = 0;
+
+ private:
+  /// The layer's grid, packed. A large one is made in parts along z, since samples take more memory until
+  /// they are packed. A part is smoothed together with as much of its neighbours as can reach it: the parts
+  /// do not show.
+  std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
+    const Box box = options_.box.expanded(reach_ + step.margin);
+    const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
+    const Parts cut = partsOf(box, voxel, smoothing.dilation + smoothing.steps);
+    const std::shared_ptr<BrickGrid> layer = detail::emptyPackedGrid(noSamples(box, voxel, cut.all));
+    const ScalarField needed =
+        NeededNode::isOfUse(step, layers_)
+            ? ScalarField(std::make_shared<NeededNode>(step, layers_, options_.voxelSize))
+            : step.displacement;
+    const int count = cut.count();
+    std::deque<Part> parts;
+    const auto bakePart = [&](int part) {
+      const ShareOfProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
+      parts.push_back({cut[part], bakeSlab(needed, cut[part], box, voxel, share)});
+    };
+    // The only part, or a part with what is around it.
+    const auto takeWindow = [&](int part) {
+      if (count > 1) return windowOf(parts, cut.around(part), box, voxel);
+      BrickSamples all = std::move(parts[0].samples);
+      all.separate();
+      return all;
+    };
+    Count total;
+    bakePart(0);
+    for (int part = 0; part < count; ++part) {
+      if (part + 1 < count) bakePart(part + 1);
+      BrickSamples window = takeWindow(part);
+      // The next window needs the end of this part and all of the next one.
+      while (parts.size() > (part + 1 < count ? 2 : 0)) parts.pop_front();
+      detail::releaseFreed();
+      const double done = kShareOfBake * std::min(part + 2, count) / count;
+      MedialSmoothing smooth{0, std::vector<bool>(window.pool.size())};
+      if (step.bound > 0)
+        smooth = smoothMedialJumps(window, smoothing, ShareOfProgress(progress_, done, done));
+      std::vector<Packing> packing = judged(step, window, cut[part], total);
+      for (std::size_t b = 0; b < packing.size(); ++b)
+        if (packing[b] == Packing::whole && smooth.signless[b]) packing[b] = Packing::absolute;
+      detail::appendPacked(*layer, std::move(window), packing);
+    }
+    report(step, total, voxel);
+    return layer;
+  }
+
+  /// The samples of the bricks of a slab.
+  BrickSamples bakeSlab(const ScalarField& displacement, const Slab& slab, const Box& box, float voxel,
+                        const Progress& progress) const {
+    // All that interpolation in the slab's bricks reads, so that bricks are kept or dropped as in one piece.
+    const float first = float(slab.begin * BrickGrid::kBrick - BrickGrid::kBefore) + 0.5f;
+    const float last = float(slab.end * BrickGrid::kBrick - 1 + BrickGrid::kAfter) - 0.5f;
+    const Box around{{box.min.x, box.min.y, first * voxel}, {box.max.x, box.max.y, last * voxel}};
+    const Box inside = box.intersection(around);
+    if (inside.isEmpty()) return noSamples(box, voxel, slab);
+    return detail::bakeSamples(displacement,
+                               {.voxelSize = voxel, .box = inside, .interpolation = Interpolation::tricubic},
+                               progress);
+  }
+
+  int dilation(float voxel) const {
+    if (options_.medialSmoothing == 0) return 0;
+    const float voxels = float(options_.medialSmoothing) * options_.voxelSize / voxel;
+    return std::max(kLeastDilation, int(std::ceil(voxels)));
+  }
+
+  /// l_i for the next layer to find its surface points on; after the last layer the estimate of the result.
+  void prepareNext(const CumuloStep& step, const std::shared_ptr<BrickGrid>& grid, CumuloSampled& sampled) {
+    const float voxel = grid->voxelSize;
+    if (step.index + 1 == layers_.size()) {
+      estimate = (level_ ? withRangesOf(*level_, step.before) : step.before) + abs(gridField(grid));
+      estimateVoxelSize = voxel;
+      return;
+    }
+    const float margin = marginOf(layers_, step.index + 1, options_);
+    const float further = step.reach - step.bound;
+    BakeOptions spec{.voxelSize = voxel,
+                     .box = options_.box.expanded(reach_ + margin),
+                     .band = {-further - margin - voxel, margin + voxel},
+                     .interpolation = Interpolation::tricubic};
+    if (options_.renormalise != CumuloGridOptions::Renormalise::off) {
+      const bool exact = options_.renormalise == CumuloGridOptions::Renormalise::rebuild;
+      const DistanceBand band{.exterior = further + 2 * margin, .interior = 2 * margin};
+      spec.voxelSize = std::max(options_.voxelSize, voxel / 2);
+      sampled.sum = exact ? rebuiltDistance(sampled.sum, spec, band, progress_)
+                          : sweptDistance(sampled.sum, spec, band, progress_);
+      sampled.surface = sampled.level = sampled.sum;
+      return;
+    }
+    // At the grid's own voxels trilinear interpolation gives the samples.
+    level_ = detail::packed(detail::bakeSamples(
+        ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))), spec,
+        ShareOfProgress(progress_, kShareOfBake, 1)));
+    sampled.level = gridField(level_);
+    sampled.surface = gridField(level_, Interpolation::tricubic);
+  }
+
+  /// The samples of one brick. Where the displacement is 0 the layer was not evaluated.
+  struct Samples {
+    std::array<float, kBrickSamples> x, y, z, displacement;
+
+    Samples(const BrickSamples& samples, const PlacedBrick& brick) {
+      const float* own = samples.pool[std::size_t(brick.pool)];
+      for (int s = 0; s < kBrickSamples; ++s) {
+        const Vec3i at{s & 7, s >> 3 & 7, s >> 6};
+        const Vec3f p = Vec3f(brick.brick * BrickGrid::kBrick + at) * samples.voxelSize;
+        x[std::size_t(s)] = p.x;
+        y[std::size_t(s)] = p.y;
+        z[std::size_t(s)] = p.z;
+        displacement[std::size_t(s)] = std::abs(own[s]);
+      }
+    }
+    PointSpans points() const { return {x, y, z}; }
+    /// Moves the samples at which the layer was evaluated to the front and returns their number.
+    std::size_t keepEvaluated() {
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < kBrickSamples; ++i) {
+        if (displacement[i] == 0) continue;
+        x[count] = x[i];
+        y[count] = y[i];
+        z[count] = z[i];
+        displacement[count++] = displacement[i];
+      }
+      return count;
+    }
+  };
+
+  /// What bricks add to the report. Kept per brick and added up in order, so that threads do not show.
+  struct Count {
+    double displacement = 0;
+    std::uint64_t active = 0, near = 0, searched = 0, missed = 0;
+
+    Count& operator+=(const Count& other) {
+      displacement += other.displacement;
+      active += other.active;
+      near += other.near;
+      searched += other.searched;
+      missed += other.missed;
+      return *this;
+    }
+  };
+
+  /// Adds what the part of a layer inside `slab` comes to, and leaves out the bricks that do not matter:
+  /// keeps those whose sums are such that the layers after this one can bring them to the surface.
+  std::vector<Packing> judged(const CumuloStep& step, const BrickSamples& part, const Slab& slab,
+                              Count& total) const {
+    std::vector<PlacedBrick> bricks = part.placed;
+    std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
+    const std::size_t stride = std::max<std::size_t>(1, bricks.size() / kSearchedBricks);
+    const VectorField foot =
+        surfacePoint(step.surface, {.steps = options_.newtonSteps, .voxel = options_.voxelSize});
+    const float least = step.bound - step.reach - step.margin;
+    std::vector<Count> counts(bricks.size());
+    std::vector<std::uint8_t> matters(bricks.size());
+    parallelFor(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
+      std::array<float, kBrickSamples> level;
+      for (std::size_t b = begin; b < end; ++b) {
+        // Wholly outside the band.
+        if (part.ranges[std::size_t(bricks[b].pool)] == Interval::of(0)) continue;
+        Samples samples(part, bricks[b]);
+        // All of a brick, though not all matter: in blocks that are known from the bake.
+        step.level.eval(samples.points(), std::span<float>(level));
+        for (std::size_t i = 0; i < kBrickSamples; ++i) {
+          if (samples.displacement[i] == 0) continue;
+          ++counts[b].active;
+          matters[b] |= level[i] + samples.displacement[i] >= least;
+          if (!(std::abs(level[i]) <= part.voxelSize)) continue;
+          counts[b].displacement += samples.displacement[i];
+          ++counts[b].near;
+        }
+        if (b % stride == 0) countMissed(step, foot, samples, counts[b]);
+      }
+    });
+    std::vector<Packing> result(part.pool.size(), Packing::leaveOut);
+    for (std::size_t b = 0; b < bricks.size(); ++b) {
+      total += counts[b];
+      if (matters[b]) result[std::size_t(bricks[b].pool)] = Packing::whole;
+    }
+    return result;
+  }
+
+  void report(const CumuloStep& step, const Count& all, float voxel) {
+    CumuloLayerReport r;
+    r.amplitude = step.layer->amplitude.range(Box::everywhere()).max;
+    r.frequency = step.layer->frequency;
+    r.voxelSize = voxel;
+    r.activeVoxels = all.active;
+    r.unconvergedFraction = all.searched > 0 ? double(all.missed) / double(all.searched) : 0.0;
+    r.meanDisplacement = all.near > 0 ? all.displacement / double(all.near) : 0.0;
+    reports.push_back(r);
+  }
+
+  /// Of some points, those whose surface point is not on the surface.
+  void countMissed(const CumuloStep& step, const VectorField& foot, Samples& samples, Count& count) const {
+    std::array<float, kBrickSamples> x, y, z, residual;
+    const std::size_t evaluated = samples.keepEvaluated();
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < evaluated; i += kSearchedShare, ++n) {
+      samples.x[n] = samples.x[i];
+      samples.y[n] = samples.y[i];
+      samples.z[n] = samples.z[i];
+    }
+    if (n == 0) return;
+    const auto first = [&](auto& lane) { return std::span(lane).first(n); };
+    foot.eval({first(samples.x), first(samples.y), first(samples.z)},
+              Spans<3>{{first(x), first(y), first(z)}});
+    step.surface.eval({first(x), first(y), first(z)}, first(residual));
+    count.searched = n;
+    for (std::size_t i = 0; i < n; ++i)
+      count.missed += !(std::abs(residual[i]) <= kFoundVoxels * options_.voxelSize);
+  }
+
+  const std::vector<CumuloLayer>& layers_;
+  const CumuloGridOptions& options_;
+  const Progress& progress_;
+  float reach_;
+  /// The sampled l_i that the next layer reads, if there is one.
+  std::shared_ptr<BrickGrid> level_;
+};
+
+}  // namespace
+
+float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index, float resultVoxelSize) {
+  const float wave = 1 / (layers[index].frequency * layers[index].detail);
+  const float aimed = wave / (index + 1 < layers.size() ? kSamplesPerWave : kSamplesPerLastWave);
+  return std::min(wave / kFewestSamplesPerWave, std::max(aimed, resultVoxelSize));
+}
+
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
+  return displacementBound(layers) + cumuloInteriorBand(layers, voxelSize, edge);
+}
+
+float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
+  const float voxel = coarsestVoxel(layers, voxelSize);
+  return std::max(6 * voxel, edge * 4 / 3 + 3 * voxel);
+}
+
+CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float voxelSize, double area,
+                                 const Box& box) {
+  // Measured. Displaced surfaces are larger than their base, of which the outside of a band is larger still;
+  // bricks that no later layer can bring to the surface are dropped, and sums need no bricks far inside.
+  constexpr double kGrowth = 1.8, kKept = 0.68, kSum = 0.78;
+  constexpr double kPacked = sizeof(std::uint16_t) * double(BrickGrid::kVolume);
+  constexpr double kUnpacked = sizeof(float) * double(BrickSamples::kCount);
+  // What bakes and smoothing hold beside the samples, or the codes of the bricks that are packed first.
+  constexpr double kWork = 1.4;
+  CumuloBytes bytes;
+  double sum = 0;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const float voxel = cumuloVoxelSize(layers, i, voxelSize);
+    const float reach = displacementBound(layers, i), margin = kMarginVoxels * voxel;
+    // The band, and bricks that it only touches.
+    const double width =
+        double(reach) + (1 + double(detail::kOuterShare)) * margin + double(BrickGrid::kBrick) * voxel;
+    const double bricks = kGrowth * area * width / std::pow(double(BrickGrid::kBrick) * voxel, 3);
+    const Parts cut = partsOf(box.expanded(displacementBound(layers) + margin), voxel,
+                              kLeastDilation + MedialSmoothingOptions{}.steps);
+    // Of a layer in parts: three, of which one has neighbours around it.
+    const double share =
+        std::min(1.0, (3.0 * cut.thickness + 3.0 * cut.halo) / double(cut.all.end - cut.all.begin));
+    const double packed = cut.count() > 1 ? kKept * bricks * kPacked : 0.0;
+    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * share * bricks * kUnpacked + packed);
+    bytes.kept += kKept * bricks * kPacked;
+    if (i + 1 == layers.size()) break;
+    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * kSum * bricks * kUnpacked);
+    sum = kSum * bricks * kPacked;
+  }
+  return bytes;
+}
+
+GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,
+                            CumuloGridOptions options, const Progress& progress) {
+  require(!options.box.isEmpty() && isFinite(options.box.min) && isFinite(options.box.max),
+          "griddedCumulo: the box of the base must be finite and not empty");
+  require(options.medialSmoothing >= 0 && options.medialSmoothing <= kMaxMedialSmoothing,
+          "griddedCumulo: medialSmoothing must be 0 to " + std::to_string(kMaxMedialSmoothing) + ", got " +
+              std::to_string(options.medialSmoothing));
+  require(options.edge >= 0 && std::isfinite(options.edge),
+          "griddedCumulo: edge must be >= 0 and finite, got " + std::to_string(options.edge));
+  require(!layers.empty(), "griddedCumulo: there must be at least one layer");
+
+  LayerSampler sampler(layers, options, progress);
+  CumuloOptions form{.voxelSize = options.voxelSize,
+                     .newtonSteps = options.newtonSteps,
+                     .closestPoint = std::move(options.closestPoint)};
+  options.closestPoint.reset();
+  // The first layer's passes all read the base at the same voxels; each level of a distance takes its time.
+  const float margin = marginOf(layers, 0, options);
+  detail::BrickMemo memo(base, cumuloVoxelSize(layers, 0, options.voxelSize),
+                         options.box.expanded(displacementBound(layers) + margin), kWholePositions);
+  form.bake = [&](const CumuloStep& step) {
+    CumuloSampled sampled = sampler(step);
+    memo.clear();
+    return sampled;
+  };
+  form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options); };
+  GriddedCumulo result;
+  result.surface = cumulo(memo.field(), layers, std::move(form));
+  result.estimate = sampler.estimate;
+  result.estimateVoxelSize = sampler.estimateVoxelSize;
+  result.estimateError = kEstimateErrorVoxels * sampler.estimateVoxelSize;
+  result.box = options.box.expanded(displacementBound(layers));
+  result.layers = std::move(sampler.reports);
+  return result;
+}
+
+}  // namespace nephele

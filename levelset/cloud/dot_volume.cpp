@@ -1,0 +1,609 @@
+// Dots of any size and any smear become points in index space with a mass, which are added to voxels with
+// trilinear weights, blurred by a discrete kernel where a dot is larger than a voxel. Trilinear weights
+// sum up to 1 and have their centroid at the splat, and a symmetric kernel keeps both.
+//
+// The points of a smeared dot are sorted in runs of four voxels: a brick adds those of a run that it holds.
+//
+// A batch of splats is sorted by brick: a splat has an entry in every brick that it touches (1.4 on average).
+// Counting and placing entries use atomic counters on a dense table over the box of the bricks; each brick
+// then sorts its entries by number, which makes the order that of the input whatever the threads did, and
+// adds them up, alone. Samples are kept in the order of OpenVDB's leaves, so that writing copies them.
+//
+// Source: Tessendorf, Production Volume Rendering (2008), "Baking anti-aliased dots".
+// Limits: the table is dense, 8 bytes per brick position; sums are single precision, so a voxel that collects
+// n dots is off by some sqrt(n) roundings.
+#include "nephele/levelset/cloud/dot_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+
+#include "nephele/levelset/grid/brick_box.h"
+#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/io/detail/vdb_assembly.h"
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele {
+namespace {
+
+constexpr int kBrick = BrickGrid::kBrick;
+constexpr std::size_t kVoxels = std::size_t(kBrick) * kBrick * kBrick;
+constexpr double kLargestTable = double(1 << 28);
+/// Voxels are numbered from -kFarthest to kFarthest along each axis.
+constexpr float kFarthest = 1e9f;
+/// Entries (of splats in bricks) that are sorted at a time, on average.
+constexpr double kBatch = double(1 << 20);
+/// Points of a smeared dot that are sorted as one, two per voxel.
+constexpr std::size_t kRun = 8;
+/// Dots that a thread takes at a time.
+constexpr std::size_t kPiece = 1 << 13;
+/// Bricks whose samples are allocated at a time.
+constexpr std::size_t kBlock = 512;
+/// Positions added on every side when the table grows, so that it grows rarely.
+constexpr int kGrowth = 4;
+
+/// A dot at rest, or a part of the way of one that is smeared.
+struct Splat {
+  Vec3f q;        ///< Index space; of a smeared dot, where the part begins.
+  float density;  ///< Of each of its points.
+  std::uint32_t dot;
+  std::uint32_t number;  ///< In the order in which splats are added.
+};
+
+/// Voxels beyond the 8 nearest that a dot reaches on each side.
+int reachOf(float radiusVoxels) {
+  return radiusVoxels > 1 ? int(std::ceil(radiusVoxels)) - 1 : 0;
+}
+
+/// Cubic B-spline of support [-2, 2].
+float cubicSpline(float x) {
+  x = std::abs(x);
+  if (x >= 2) return 0;
+  const float near = 4 - 6 * x * x + 3 * x * x * x, far = (2 - x) * (2 - x) * (2 - x);
+  return x < 1 ? near / 6 : far / 6;
+}
+
+constexpr int kMostWeights = 2 * (int(DotVolume::kLargestRadius) + 1);
+
+/// The blur of a dot along one axis: samples of a spline at whole voxels, which sum up to 1.
+struct DotKernel {
+  explicit DotKernel(float radiusVoxels) : reach(reachOf(radiusVoxels)) {
+    float sum = 0;
+    for (int i = -reach; i <= reach; ++i) sum += values[i + reach] = cubicSpline(2 * float(i) / radiusVoxels);
+    for (int i = 0; i <= 2 * reach; ++i) values[i] /= sum;
+  }
+  /// Weights of the 2 reach + 2 voxels around a splat that lies `share` beyond a voxel.
+  void weights(float share, float* result) const {
+    result[0] = (1 - share) * values[0];
+    for (int i = 1; i <= 2 * reach; ++i) result[i] = (1 - share) * values[i] + share * values[i - 1];
+    result[2 * reach + 1] = share * values[2 * reach];
+  }
+
+  int reach;
+  float values[kMostWeights];
+};
+
+/// Adds to the samples of a brick, x slowest, z fastest: density alone, or density and colour side by side.
+template <bool hasColor>
+struct BrickSums {
+  static constexpr int kChannels = hasColor ? 4 : 1;
+
+  float* samples;
+
+  static void add(float* sample, float amount, const Vec3f& c) {
+    sample[0] += amount;
+    if constexpr (hasColor)
+      for (int i = 0; i < 3; ++i) sample[1 + i] += amount * c[i];
+  }
+
+  /// A small dot whose 8 voxels start at `low`, relative to the brick, and which lies `share` beyond.
+  void addSmall(const Vec3i& low, const Vec3f& share, float amount, const Vec3f& c) const {
+    const auto beside = [](int x) { return unsigned(x + 1) > unsigned(kBrick); };
+    if (beside(low.x) || beside(low.y) || beside(low.z)) return;
+    const float wx[2] = {1 - share.x, share.x}, wy[2] = {1 - share.y, share.y},
+                wz[2] = {1 - share.z, share.z};
+    const auto inside = [](int x) { return unsigned(x) < unsigned(kBrick - 1); };
+    if (!(inside(low.x) && inside(low.y) && inside(low.z))) return addBox(low, 2, wx, wy, wz, amount, c);
+    float* const s = samples + ((low.x * kBrick + low.y) * kBrick + low.z) * kChannels;
+    for (int x = 0; x < 2; ++x)
+      for (int y = 0; y < 2; ++y) {
+        const float w = amount * wx[x] * wy[y];
+        float* const pair = s + (x * kBrick + y) * kBrick * kChannels;
+        add(pair, w * wz[0], c);
+        add(pair + kChannels, w * wz[1], c);
+      }
+  }
+
+  /// `count` voxels per axis from `low` on, those that lie in the brick.
+  void addBox(const Vec3i& low, int count, const float* wx, const float* wy, const float* wz, float amount,
+              const Vec3f& c) const {
+    const auto first = [](int x) { return std::max(0, -x); };
+    const auto last = [count](int x) { return std::min(count, kBrick - x); };
+    for (int x = first(low.x); x < last(low.x); ++x)
+      for (int y = first(low.y); y < last(low.y); ++y) {
+        const float w = amount * wx[x] * wy[y];
+        float* const row = samples + ((low.x + x) * kBrick + low.y + y) * kBrick * kChannels;
+        for (int z = first(low.z); z < last(low.z); ++z) add(row + (low.z + z) * kChannels, w * wz[z], c);
+      }
+  }
+};
+
+/// The bricks that a splat touches, both included.
+struct BrickSpan {
+  Vec3i first, last;
+
+  template <class Body>
+  void forEach(const Body& body) const {
+    if (first == last) return body(first);
+    for (int z = first.z; z <= last.z; ++z)
+      for (int y = first.y; y <= last.y; ++y)
+        for (int x = first.x; x <= last.x; ++x) body(Vec3i{x, y, z});
+  }
+};
+
+/// Without a call of std::floor, which needs instructions that not every machine has.
+int floorOf(float x) {
+  const int whole = int(x);
+  return whole - int(x < float(whole));
+}
+Vec3i floorOf(const Vec3f& q) {
+  return {floorOf(q.x), floorOf(q.y), floorOf(q.z)};
+}
+
+BrickSpan bricksOf(const Vec3f& q, int reach) {
+  const Vec3i low = floorOf(q), r{reach, reach, reach};
+  return {brickOf(low - r), brickOf(low + r + Vec3i{1, 1, 1})};
+}
+
+/// At least `count` values, whatever they are; grows rarely.
+void makeRoom(std::vector<Splat>& values, std::size_t count) {
+  if (values.size() >= count) return;
+  values = {};
+  detail::resizeLarge(values, count + count / 4);
+}
+
+[[noreturn]] void refuse(std::size_t dot, const std::string& what) {
+  throw Error(fmt::format("dots: dot {} {}", dot, what));
+}
+
+std::string shown(const Vec3f& v) {
+  return fmt::format("{:g},{:g},{:g}", v.x, v.y, v.z);
+}
+
+}  // namespace
+
+struct DotVolume::Impl {
+  DotVolumeOptions options;
+  float perVoxel = 1;   ///< 1 / volume of a voxel.
+  float ownRadius = 0;  ///< Of dots that bring none, voxels.
+  int ownReach = 0;
+  std::uint64_t dotCount = 0;
+  double mass = 0;
+
+  BrickBox bricks;
+  std::vector<std::int32_t> slots;      ///< Per brick position: number of its samples, or -1.
+  std::vector<std::uint32_t> counters;  ///< Per brick position: all 0 between batches.
+  std::vector<std::unique_ptr<float[]>> blocks;
+  std::size_t slotCount = 0;
+
+  // Working memory of a batch.
+  std::vector<std::size_t> firstSplat;  ///< Of each dot, and after the last.
+  std::vector<Splat> splats;
+  std::size_t splatCount = 0;
+  std::vector<Splat> entries;
+
+  std::size_t channels() const { return options.withColor ? 4 : 1; }
+  float* samples(std::int32_t slot) const {
+    return blocks[std::size_t(slot) / kBlock].get() + std::size_t(slot) % kBlock * channels() * kVoxels;
+  }
+  std::int32_t slotOf(const Vec3i& b) const { return bricks.covers(b) ? slots[bricks.numberOf(b)] : -1; }
+
+  float radiusVoxels(const DotSpans& dots, std::size_t i) const {
+    return dots.radii.empty() ? ownRadius : dots.radii[i] / options.voxelSize;
+  }
+  int reach(const DotSpans& dots, std::size_t i) const {
+    return dots.radii.empty() ? ownReach : reachOf(dots.radii[i] / options.voxelSize);
+  }
+  bool smears(const DotSpans& dots) const {
+    return !dots.velocities.empty() && (options.shutterOpen != 0 || options.shutterClose != 0);
+  }
+  /// Way of a dot while the shutter is open, voxels.
+  float smearVoxels(const DotSpans& dots, std::size_t i) const {
+    return length(dots.velocities[i]) * (options.shutterClose - options.shutterOpen) / options.voxelSize;
+  }
+  /// Points that a smeared dot is the sum of: two Gauss-Legendre points in each of some equal pieces.
+  std::size_t pointsOf(const DotSpans& dots, std::size_t i) const {
+    if (!smears(dots)) return 1;
+    const float way = smearVoxels(dots, i);
+    return way > 0 ? 2 * std::size_t(std::ceil(way)) : 1;
+  }
+  /// Where those points are, index space.
+  struct Way {
+    Vec3d start, step;
+    std::size_t count;
+
+    Vec3f point(std::size_t k) const {
+      constexpr double kSide = 0.5 * std::numbers::inv_sqrt3;
+      const double place = double(k / 2) + 0.5 + (count == 1 ? 0 : k % 2 ? kSide : -kSide);
+      return Vec3f(start + step * place);
+    }
+  };
+  Way wayOf(const DotSpans& dots, std::size_t i) const {
+    const double scale = 1.0 / double(options.voxelSize);
+    Way way{Vec3d(dots.positions[i]) * scale, {}, pointsOf(dots, i)};
+    if (!smears(dots)) return way;
+    const Vec3d v = Vec3d(dots.velocities[i]) * scale;
+    const double open = double(options.shutterOpen), close = double(options.shutterClose);
+    way.start += v * open;
+    way.step = v * ((close - open) / (way.count == 1 ? 1.0 : double(way.count / 2)));
+    return way;
+  }
+  /// The points [begin, end) of a dot, which a splat stands for.
+  struct Run {
+    std::size_t begin, end;
+  };
+  Run runOf(const Splat& splat, const Way& way) const {
+    const std::size_t begin = (splat.number - firstSplat[splat.dot]) * kRun;
+    return {begin, std::min(begin + kRun, way.count)};
+  }
+  /// The bricks that a splat touches, and some more if it is smeared aslant.
+  BrickSpan bricksAt(const DotSpans& dots, const Splat& splat) const {
+    const int extent = reach(dots, splat.dot);
+    BrickSpan span = bricksOf(splat.q, extent);
+    if (!smears(dots)) return span;
+    const Way way = wayOf(dots, splat.dot);
+    const BrickSpan last = bricksOf(way.point(runOf(splat, way).end - 1), extent);
+    return {min(span.first, last.first), max(span.last, last.last)};
+  }
+
+  const float* sampleAt(const Vec3i& voxel) const;
+  void requireSound(const DotSpans& dots) const;
+  void addBatch(const DotSpans& dots, const Progress& progress);
+  BrickSpan makeSplats(const DotSpans& dots);
+  void cover(const BrickSpan& span);
+  std::vector<std::size_t> countEntries(const DotSpans& dots);
+  template <bool hasColor>
+  void sumBrick(const DotSpans& dots, std::size_t position, Splat* first, Splat* last) const;
+};
+
+void DotVolume::Impl::requireSound(const DotSpans& dots) const {
+  const float h = options.voxelSize;
+  parallelFor(dots.size(), kPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3f& p = dots.positions[i];
+      if (!isFinite(p)) refuse(i, "has the position " + shown(p) + ", which must be finite");
+      if (!dots.masses.empty() && !(dots.masses[i] >= 0 && std::isfinite(dots.masses[i])))
+        refuse(i, fmt::format("has the mass {:g}, which must be >= 0 and finite", dots.masses[i]));
+      if (!dots.radii.empty() && !(dots.radii[i] >= 0 && dots.radii[i] <= kLargestRadius * h))
+        refuse(i, fmt::format("has the radius {:g}, allowed: 0 to {:g} ({:g} voxels)", dots.radii[i],
+                              kLargestRadius * h, kLargestRadius));
+      if (!dots.colors.empty() && !isFinite(dots.colors[i]))
+        refuse(i, "has the colour " + shown(dots.colors[i]) + ", which must be finite");
+      float reach = kLargestRadius;
+      if (!dots.velocities.empty()) {
+        if (!isFinite(dots.velocities[i]))
+          refuse(i, "has the velocity " + shown(dots.velocities[i]) + ", which must be finite");
+        if (smears(dots)) {
+          if (const float way = smearVoxels(dots, i); !(way <= kLongestSmear))
+            refuse(i, fmt::format("is smeared over {:g} voxels, allowed: up to {:g}; use a shorter shutter "
+                                  "or larger voxels",
+                                  way, kLongestSmear));
+          reach += length(dots.velocities[i]) *
+                   std::max(std::abs(options.shutterOpen), std::abs(options.shutterClose)) / h;
+        }
+      }
+      const float farthest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / h + reach;
+      if (!(farthest <= kFarthest))
+        refuse(i, fmt::format("at {} is {:g} voxels from the origin, allowed: up to {:g}", shown(p), farthest,
+                              kFarthest));
+    }
+  });
+}
+
+BrickSpan DotVolume::Impl::makeSplats(const DotSpans& dots) {
+  splatCount = firstSplat.back();
+  makeRoom(splats, splatCount);
+  const std::size_t pieces = (dots.size() + kPiece - 1) / kPiece;
+  std::vector<BrickSpan> spans(pieces);
+  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
+    const std::size_t begin = piece * kPiece, end = std::min(begin + kPiece, dots.size());
+    BrickSpan span{};
+    for (std::size_t i = begin; i < end; ++i) {
+      const Way way = wayOf(dots, i);
+      const double own = double(dots.masses.empty() ? 1.0f : dots.masses[i]);
+      const float density = float(own * double(perVoxel) / double(way.count));
+      for (std::size_t n = firstSplat[i]; n < firstSplat[i + 1]; ++n) {
+        splats[n] = {way.point((n - firstSplat[i]) * kRun), density, std::uint32_t(i), std::uint32_t(n)};
+        const BrickSpan touched = bricksAt(dots, splats[n]);
+        span = n == firstSplat[begin]
+                   ? touched
+                   : BrickSpan{min(span.first, touched.first), max(span.last, touched.last)};
+      }
+    }
+    spans[piece] = span;
+  });
+  BrickSpan all = spans.front();
+  for (const BrickSpan& s : spans) all = {min(all.first, s.first), max(all.last, s.last)};
+  return all;
+}
+
+void DotVolume::Impl::cover(const BrickSpan& span) {
+  const BrickBox old = bricks;
+  const bool isEmpty = slots.empty();
+  const Vec3i end = old.first + old.count, one{1, 1, 1}, margin{kGrowth, kGrowth, kGrowth};
+  if (!isEmpty && min(old.first, span.first) == old.first && max(end, span.last + one) == end) return;
+  Vec3i low = span.first - margin, high = span.last + one + margin;
+  if (!isEmpty) {
+    low = min(low, old.first);
+    high = max(high, end);
+  }
+  const Vec3i count = high - low;
+  require(
+      double(count.x) * count.y * count.z <= kLargestTable,
+      fmt::format("dots: they are spread over {} x {} x {} voxels, more than can be held; use larger voxels",
+                  8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
+  bricks = {low, count};
+  slots = enlarged(slots, old, bricks);
+  counters.assign(bricks.size(), 0);
+}
+
+/// Counts the entries of every brick and returns the bricks that have some, in the order of the table.
+std::vector<std::size_t> DotVolume::Impl::countEntries(const DotSpans& dots) {
+  const std::size_t pieces = (splatCount + kPiece - 1) / kPiece;
+  std::vector<std::vector<std::size_t>> found(pieces);
+  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
+    const std::size_t end = std::min((piece + 1) * kPiece, splatCount);
+    for (std::size_t s = piece * kPiece; s < end; ++s)
+      bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
+        const std::size_t i = bricks.numberOf(b);
+        if (std::atomic_ref(counters[i]).fetch_add(1, std::memory_order_relaxed) == 0)
+          found[piece].push_back(i);
+      });
+  });
+  std::vector<std::size_t> touched;
+  std::size_t count = 0;
+  for (const auto& part : found) count += part.size();
+  touched.reserve(count);
+  // Sorting beats a walk over the table where little of it is touched.
+  if (count < counters.size() / 16) {
+    for (const auto& part : found) touched.insert(touched.end(), part.begin(), part.end());
+    std::sort(touched.begin(), touched.end());
+  } else {
+    for (std::size_t i = 0; i < counters.size(); ++i)
+      if (counters[i] > 0) touched.push_back(i);
+  }
+  return touched;
+}
+
+template <bool hasColor>
+void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t position, Splat* first, Splat* last) const {
+  const auto isBefore = [](const Splat& a, const Splat& b) { return a.number < b.number; };
+  if (!std::is_sorted(first, last, isBefore)) std::sort(first, last, isBefore);
+  const Vec3i origin = bricks.at(position) * kBrick;
+  const BrickSums<hasColor> sums{samples(slots[position])};
+  const bool smeared = smears(dots);
+  for (; first != last; ++first) {
+    const std::size_t dot = first->dot;
+    const Vec3f color = dots.colors.empty() ? Vec3f{1, 1, 1} : dots.colors[dot];
+    const Way way = smeared ? wayOf(dots, dot) : Way{};
+    const Run run = smeared ? runOf(*first, way) : Run{0, 1};
+    if (reach(dots, dot) == 0) {
+      for (std::size_t k = run.begin; k < run.end; ++k) {
+        const Vec3f q = k == run.begin ? first->q : way.point(k);
+        const Vec3i voxel = floorOf(q);
+        sums.addSmall(voxel - origin, q - Vec3f(voxel), first->density, color);
+      }
+      continue;
+    }
+    const DotKernel kernel(radiusVoxels(dots, dot));
+    const Vec3i reach{kernel.reach, kernel.reach, kernel.reach};
+    float wx[kMostWeights], wy[kMostWeights], wz[kMostWeights];
+    for (std::size_t k = run.begin; k < run.end; ++k) {
+      const Vec3f q = k == run.begin ? first->q : way.point(k);
+      const Vec3i voxel = floorOf(q);
+      kernel.weights(q.x - float(voxel.x), wx);
+      kernel.weights(q.y - float(voxel.y), wy);
+      kernel.weights(q.z - float(voxel.z), wz);
+      sums.addBox(voxel - origin - reach, 2 * kernel.reach + 2, wx, wy, wz, first->density, color);
+    }
+  }
+}
+
+void DotVolume::Impl::addBatch(const DotSpans& dots, const Progress& progress) {
+  cover(makeSplats(dots));
+  const std::vector<std::size_t> touched = countEntries(dots);
+  const std::size_t oldSlots = slotCount;
+  std::vector<std::size_t> starts(touched.size() + 1, 0);
+  for (std::size_t k = 0; k < touched.size(); ++k) {
+    starts[k + 1] = starts[k] + counters[touched[k]];
+    counters[touched[k]] = std::uint32_t(starts[k]);
+    std::int32_t& slot = slots[touched[k]];
+    if (slot >= 0) continue;
+    // Its samples are set to 0 by the thread that adds to them first.
+    if (slotCount % kBlock == 0)
+      blocks.push_back(std::make_unique_for_overwrite<float[]>(kBlock * channels() * kVoxels));
+    slot = std::int32_t(slotCount++);
+  }
+  makeRoom(entries, starts.back());
+  parallelFor(splatCount, kPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s)
+      bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
+        entries[std::atomic_ref(counters[bricks.numberOf(b)]).fetch_add(1, std::memory_order_relaxed)] =
+            splats[s];
+      });
+  });
+  parallelFor(touched.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::int32_t slot = slots[touched[k]];
+      if (std::size_t(slot) >= oldSlots) std::fill_n(samples(slot), channels() * kVoxels, 0.0f);
+      Splat* const first = entries.data() + starts[k];
+      Splat* const last = entries.data() + starts[k + 1];
+      if (options.withColor)
+        sumBrick<true>(dots, touched[k], first, last);
+      else
+        sumBrick<false>(dots, touched[k], first, last);
+      counters[touched[k]] = 0;
+    }
+  });
+  progress.check();
+}
+
+DotVolume::DotVolume(const DotVolumeOptions& o) : impl_(std::make_unique<Impl>()) {
+  require(o.voxelSize > 0 && std::isfinite(o.voxelSize),
+          fmt::format("dots: voxelSize must be > 0 and finite, got {:g}", o.voxelSize));
+  require(o.radius >= 0 && o.radius <= kLargestRadius * o.voxelSize,
+          fmt::format("dots: radius must be from 0 to {:g} ({:g} voxels), got {:g}",
+                      kLargestRadius * o.voxelSize, kLargestRadius, o.radius));
+  require(std::isfinite(o.shutterOpen) && std::isfinite(o.shutterClose) && o.shutterOpen <= o.shutterClose,
+          fmt::format("dots: the shutter must open before it closes, both finite, got {:g} and {:g}",
+                      o.shutterOpen, o.shutterClose));
+  impl_->options = o;
+  impl_->ownRadius = o.radius / o.voxelSize;
+  impl_->ownReach = reachOf(impl_->ownRadius);
+  impl_->perVoxel = float(1 / (double(o.voxelSize) * double(o.voxelSize) * double(o.voxelSize)));
+}
+
+DotVolume::~DotVolume() = default;
+DotVolume::DotVolume(DotVolume&&) noexcept = default;
+DotVolume& DotVolume::operator=(DotVolume&&) noexcept = default;
+
+void DotVolume::add(const DotSpans& dots, const Progress& progress) {
+  dots.requireFit("dots");
+  impl_->requireSound(dots);
+  std::vector<std::size_t>& firstSplat = impl_->firstSplat;
+  for (std::size_t begin = 0; begin < dots.size();) {
+    firstSplat.assign(1, 0);
+    double entries = 0;
+    std::size_t end = begin;
+    for (; end < dots.size() && entries < kBatch; ++end) {
+      const std::size_t count = (impl_->pointsOf(dots, end) + kRun - 1) / kRun;
+      const double wide = 2.0 * impl_->reach(dots, end) + (count > 1 ? 1 + double(kRun) / 4 : 1);
+      const double bricks = 1 + wide / kBrick;
+      firstSplat.push_back(firstSplat.back() + count);
+      entries += double(count) * bricks * bricks * bricks;
+    }
+    impl_->addBatch(dots.part(begin, end - begin), progress);
+    progress.advance(double(end) / double(dots.size()));
+    begin = end;
+  }
+  impl_->dotCount += dots.size();
+  for (const float mass : dots.masses) impl_->mass += double(mass);
+  if (dots.masses.empty()) impl_->mass += double(dots.size());
+}
+
+const float* DotVolume::Impl::sampleAt(const Vec3i& voxel) const {
+  const std::int32_t slot = slotOf(brickOf(voxel));
+  if (slot < 0) return nullptr;
+  const int i = (insideBrick(voxel.x) * kBrick + insideBrick(voxel.y)) * kBrick + insideBrick(voxel.z);
+  return samples(slot) + std::size_t(i) * channels();
+}
+
+float DotVolume::density(const Vec3i& voxel) const {
+  const float* const sample = impl_->sampleAt(voxel);
+  return sample ? sample[0] : 0;
+}
+
+Vec3f DotVolume::color(const Vec3i& voxel) const {
+  const float* const sample = impl_->sampleAt(voxel);
+  if (!impl_->options.withColor || !sample || !(sample[0] > 0)) return {};
+  return Vec3f{sample[1], sample[2], sample[3]} / sample[0];
+}
+
+std::uint64_t DotVolume::dotCount() const {
+  return impl_->dotCount;
+}
+
+double DotVolume::mass() const {
+  return impl_->mass;
+}
+
+std::size_t DotVolume::brickCount() const {
+  return impl_->slotCount;
+}
+
+std::size_t DotVolume::memoryBytes() const {
+  const std::size_t samples = kVoxels * impl_->channels() * sizeof(float);
+  return impl_->blocks.size() * kBlock * samples + impl_->slotCount * samples +
+         impl_->slots.size() * (sizeof(std::int32_t) + sizeof(std::uint32_t)) +
+         impl_->splats.capacity() * sizeof(Splat) + impl_->entries.capacity() * sizeof(Splat);
+}
+
+namespace {
+
+/// Colours of one brick: sums over density, and the mean where there is none. False if there is none at all.
+bool fillColors(const float* samples, openvdb::Vec3SGrid::TreeType::LeafNodeType& leaf) {
+  double sum[4] = {};
+  for (std::size_t v = 0; v < kVoxels; ++v)
+    for (std::size_t c = 0; c < 4; ++c) sum[c] += double(samples[4 * v + c]);
+  if (!(sum[0] > 0)) return false;
+  const openvdb::Vec3s mean(float(sum[1] / sum[0]), float(sum[2] / sum[0]), float(sum[3] / sum[0]));
+  for (std::size_t v = 0; v < kVoxels; ++v) {
+    const float* const s = samples + 4 * v;
+    leaf.setValueOn(openvdb::Index(v),
+                    s[0] > 0 ? openvdb::Vec3s(s[1] / s[0], s[2] / s[0], s[3] / s[0]) : mean);
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) const {
+  detail::initializeOpenVdb();
+  const auto transform = openvdb::math::Transform::createLinearTransform(double(impl_->options.voxelSize));
+  const auto density = openvdb::FloatGrid::create(0.0f);
+  density->setName(name);
+  density->setGridClass(openvdb::GRID_FOG_VOLUME);
+  density->setSaveFloatAsHalf(halfFloat);
+  density->setTransform(transform->copy());
+  detail::assembleTree(density->tree(), impl_->bricks.first, impl_->bricks.count,
+                       [&](const Vec3i& position, const openvdb::Coord& origin) -> detail::LeafOrTile {
+                         const std::int32_t slot = impl_->slots[impl_->bricks.numberOf(position)];
+                         if (slot < 0) return {nullptr, 0.0f, false};
+                         const float* const samples = impl_->samples(slot);
+                         const auto isActive = [](float v) { return v > 0; };
+                         if (impl_->channels() == 1) return detail::leafOf(samples, origin, isActive);
+                         float densities[kVoxels];
+                         for (std::size_t v = 0; v < kVoxels; ++v) densities[v] = samples[4 * v];
+                         return detail::leafOf(densities, origin, isActive);
+                       });
+  std::vector<VdbGrid> grids{detail::wrapGrid(density)};
+  if (!impl_->options.withColor) return grids;
+
+  using Leaf = openvdb::Vec3SGrid::TreeType::LeafNodeType;
+  const auto color = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
+  color->setName("Cd");
+  color->setSaveFloatAsHalf(halfFloat);
+  color->setTransform(transform->copy());
+  std::vector<std::unique_ptr<Leaf>> leaves(impl_->slots.size());
+  parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (impl_->slots[i] < 0) continue;
+      const Vec3i origin = impl_->bricks.at(i) * kBrick;
+      leaves[i] =
+          std::make_unique<Leaf>(openvdb::Coord(origin.x, origin.y, origin.z), openvdb::Vec3s(0.0f), false);
+      if (!fillColors(impl_->samples(impl_->slots[i]), *leaves[i])) leaves[i].reset();
+    }
+  });
+  for (auto& leaf : leaves)
+    if (leaf) color->tree().addLeaf(leaf.release());
+  grids.push_back(detail::wrapGrid(color));
+  return grids;
+}
+
+double estimatedDotVolumeBytes(const Box& box, double brickCount, double dotCount,
+                               const DotVolumeOptions& options) {
+  const double edge = double(options.voxelSize) * kBrick;
+  double positions = 1;
+  for (int axis = 0; axis < 3; ++axis) positions *= double(box.size()[axis]) / edge + 2 * (kGrowth + 1);
+  const double samples = double(kVoxels) * sizeof(float) * (options.withColor ? 4 : 1);
+  const double bricks = std::min(brickCount, positions);
+  // Samples here and in the grids; a table with two numbers, or a number and a colour's leaf; a batch.
+  return 2 * bricks * samples + positions * (2 * sizeof(std::int32_t) + (options.withColor ? 8 : 0)) +
+         std::min(dotCount, kBatch) * 3 * double(sizeof(Splat));
+}
+
+}  // namespace nephele

@@ -1,0 +1,69 @@
+#include "nephele/levelset/cut/cut_input.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+
+bool isVolumeFile(const std::string& path) {
+  return path.ends_with(".vdb") || path.ends_with(".nvdb");
+}
+
+std::shared_ptr<const BrickGrid> readLevelSet(const std::string& path) {
+  const VdbGrid grid = readScalarGrid(path);
+  if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
+    throw Error(fmt::format("{}: grid '{}' is not a level set; 'nephele mesh' makes a mesh of a density",
+                            path, info.name));
+  return toBricks(grid);
+}
+
+Mesh readSolid(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
+  if (isVolumeFile(path)) {
+    Mesh surface = marchingCubes(*readLevelSet(path));
+    require(surface.faceCount() > 0, path + ": its level set has no surface");
+    return surface;
+  }
+  const Mesh soup = readMesh(path);
+  try {
+    RepairedMesh repaired = repairMesh(soup, repair, progress);
+    for (const std::string& what : repaired.repairs) progress.note(fmt::format("{}: {}", path, what));
+    return std::move(repaired.mesh);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
+std::vector<Vec3f> scatteredPoints(std::span<const CutPart> parts, int count, std::uint32_t seed) {
+  // Voxels along a part in which points are scattered.
+  constexpr double kResolution = 128;
+  std::vector<double> reached{0};
+  for (const CutPart& part : parts) reached.push_back(reached.back() + signedVolume(part.mesh));
+  std::vector<Vec3f> points;
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const auto until = std::size_t(std::lround(count * reached[i + 1] / reached.back()));
+    if (until <= last) continue;
+    const Box box = boundingBox(parts[i].mesh);
+    const double voxel = double(box.longestSide()) / kResolution;
+    const ScalarField inside =
+        parts[i].level
+            ? gridField(parts[i].level)
+            : meshDistance(parts[i].mesh, {.voxelSize = voxel, .exteriorBand = voxel, .interiorBand = voxel});
+    const auto some = scatteredPoints(inside, box, int(until - last), seed + std::uint32_t(i));
+    points.insert(points.end(), some.begin(), some.end());
+    last = until;
+  }
+  return points;
+}
+
+}  // namespace nephele

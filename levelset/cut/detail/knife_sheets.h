@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/mesh/triangle_tree.h"
+
+namespace nephele::detail {
+
+/// Two directions across a surface, of length 1.
+struct PlaneFrame {
+  Vec3d u{}, v{};
+
+  /// Depends on the normal alone; u x v = normal.
+  static PlaneFrame of(const Vec3d& normal);
+};
+
+/// A surface that parts a solid: a knife, or with a kerf one of its two sides.
+struct KnifeSheet {
+  /// What it is, for errors.
+  std::string name;
+  /// Which knife it belongs to: rough blades, then solids. The lower side of a knife comes first.
+  std::uint32_t knife = 0;
+  std::vector<Vec3d> positions;
+  /// They face the negative side.
+  std::vector<TriangleIndices> triangles;
+  /// Above 0 on the positive side, below on the other; the larger the number, the surer the sign.
+  std::function<double(const Vec3d&)> side;
+  /// Where a point is on the knife: one frame for all triangles, or one for each.
+  std::vector<PlaneFrame> frames;
+  std::vector<std::uint32_t> frameOf;
+};
+
+class CutSource;
+
+/// The sheets of all rough blades and solids of a cut; of blades, what is in and near the solid that is cut.
+/// @throws Error if a knife's options are out of range, a solid is open, inside out or not finite, or a kerf
+/// is so wide that a solid's sides cross themselves.
+std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSource& solid);
+
+/// How often a closed surface winds around a point, not on it. Cost: linear.
+double windingNumber(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
+                     const Vec3d& point);
+
+}  // namespace nephele::detail

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "nephele/modeling/base/math.h"
+
+namespace nephele {
+
+/// A box of bricks, numbered as in the table of a grid: x fastest, then y, then z.
+struct BrickBox {
+  Vec3i first{}, count{};
+
+  std::size_t size() const { return std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z); }
+  bool covers(const Vec3i& brick) const {
+    const Vec3i b = brick - first;
+    return b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < count.x && b.y < count.y && b.z < count.z;
+  }
+  /// Of a brick that it covers.
+  std::size_t numberOf(const Vec3i& brick) const {
+    const Vec3i b = brick - first;
+    return (std::size_t(b.z) * std::size_t(count.y) + std::size_t(b.y)) * std::size_t(count.x) +
+           std::size_t(b.x);
+  }
+  /// The brick of a number less than size().
+  Vec3i at(std::size_t number) const {
+    const auto nx = std::size_t(count.x), ny = std::size_t(count.y);
+    return first + Vec3i{int(number % nx), int(number / nx % ny), int(number / nx / ny)};
+  }
+};
+
+/// A table of one number per brick, in a larger box: -1 for the bricks that are new.
+inline std::vector<std::int32_t> enlarged(const std::vector<std::int32_t>& table, const BrickBox& box,
+                                          const BrickBox& larger) {
+  std::vector<std::int32_t> result(larger.size(), -1);
+  for (int z = 0; z < box.count.z; ++z)
+    for (int y = 0; y < box.count.y; ++y) {
+      const Vec3i row = box.first + Vec3i{0, y, z};
+      std::copy_n(table.begin() + std::ptrdiff_t(box.numberOf(row)), box.count.x,
+                  result.begin() + std::ptrdiff_t(larger.numberOf(row)));
+    }
+  return result;
+}
+
+}  // namespace nephele

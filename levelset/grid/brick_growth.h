@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "nephele/levelset/grid/brick_box.h"
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/lattice.h"
+#include "nephele/modeling/base/progress.h"
+
+/// Sparse grids whose extent is found while they are computed. For the implementation of advection.
+namespace nephele::detail {
+
+/// Samples that a brick has of its own.
+inline constexpr int kOwnSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+
+/// World positions of the own samples of `brick`, x fastest.
+struct BrickPoints {
+  std::array<float, kOwnSamples> x, y, z;
+  BrickPoints() = default;
+  BrickPoints(const Lattice& lattice, const Vec3i& brick);
+  Vec3f operator[](int i) const { return {x[std::size_t(i)], y[std::size_t(i)], z[std::size_t(i)]}; }
+  void set(int i, const Vec3f& p) {
+    x[std::size_t(i)] = p.x, y[std::size_t(i)] = p.y, z[std::size_t(i)] = p.z;
+  }
+};
+
+/// A number for each of some bricks: a dense table over their box, which grows.
+class BrickNumbers {
+ public:
+  /// The number of `brick`, or -1.
+  std::int32_t at(const Vec3i& brick) const {
+    return bricks_.covers(brick) ? numbers_[bricks_.numberOf(brick)] : -1;
+  }
+  /// @throws Error if the box becomes too large to hold.
+  void set(const Vec3i& brick, std::int32_t number);
+  const Vec3i& first() const { return bricks_.first; }
+  const Vec3i& count() const { return bricks_.count; }
+
+ private:
+  BrickBox bricks_;
+  std::vector<std::int32_t> numbers_;
+};
+
+/// Bricks and `components` times kOwnSamples samples of each, one component after the other.
+struct GrownBricks {
+  int components = 1;
+  std::vector<Vec3i> bricks;
+  std::vector<float> samples;
+  /// Bricks that were found to matter; the others stand beside them.
+  std::size_t relevantCount = 0;
+};
+
+struct GrowthOptions {
+  int components = 1;
+  /// Keep the 26 neighbours of the bricks that matter, too.
+  bool withNeighbours = false;
+};
+
+/// Fills the samples of a brick and says whether the brick matters. Called from several threads.
+using EvaluateBrick = std::function<bool(const Vec3i& brick, float* samples)>;
+
+/// Evaluates `seeds`, then the neighbours of bricks that matter, until none that matters is left outside: all
+/// of a connected region is found from any brick in it. The result does not depend on the threads.
+GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& options,
+                       const EvaluateBrick& evaluate, const Progress& progress);
+
+/// What interpolation reads where no brick stands.
+enum class Beyond {
+  background,  ///< The background.
+  nearest,     ///< The nearest sample of the brick that is read.
+};
+
+/// One grid for each component. Every brick gets a place of its own in the pool, in the order of the table,
+/// unless it and all that its borders read is one background.
+std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, const Lattice& lattice,
+                                                      std::span<const float> backgrounds, Beyond beyond);
+
+}  // namespace nephele::detail

@@ -1,0 +1,179 @@
+// A brick's borders are copies of its neighbours' samples, which a grid needs once it is sampled and not
+// while it is made. So samples stay without them until they are packed: each brick is put together with its
+// borders in a buffer, and only its codes are kept. Bricks are packed from below in z, and what lies more
+// than a brick below those in work is given back, so that samples and codes never stand side by side.
+#include "nephele/levelset/grid/brick_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele::detail {
+
+namespace {
+
+constexpr int kBrick = BrickGrid::kBrick;
+constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
+constexpr std::size_t kBricksPerTask = 32;
+/// Bricks along z that are packed before samples below them are given back.
+constexpr int kGroup = 8;
+
+/// Writes the kVolume samples of a brick with its borders to `stored`.
+void withBorders(const BrickSamples& samples, const Vec3i& brick, float* stored) {
+  std::array<const float*, 27> around;
+  for (int n = 0; n < 27; ++n)
+    around[std::size_t(n)] =
+        samples.pool[std::size_t(samples.poolIndex(brick + Vec3i{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1}))];
+  for (int z = -BrickGrid::kBefore; z < kBrick + BrickGrid::kAfter; ++z)
+    for (int y = -BrickGrid::kBefore; y < kBrick + BrickGrid::kAfter; ++y) {
+      const int row = (brickOf(z) + 1) * 9 + (brickOf(y) + 1) * 3;
+      const int offset = BrickSamples::offset(0, insideBrick(y), insideBrick(z));
+      const float* before = around[std::size_t(row)] + offset;
+      const float* own = around[std::size_t(row) + 1] + offset;
+      const float* after = around[std::size_t(row) + 2] + offset;
+      stored = std::copy_n(before + kBrick - BrickGrid::kBefore, BrickGrid::kBefore, stored);
+      stored = std::copy_n(own, kBrick, stored);
+      stored = std::copy_n(after, BrickGrid::kAfter, stored);
+    }
+}
+
+/// Room for `count` values in all. What stands there moves piece by piece, so that it is never held twice.
+void reserveFor(std::vector<std::uint16_t>& values, std::size_t count) {
+  constexpr std::size_t kPiece = std::size_t(1) << 21;
+  if (count <= values.capacity()) return;
+  std::vector<std::uint16_t> larger;
+  // More will follow what already stands there.
+  reserveLarge(larger, values.size() > kVolume ? count + count / 2 : count);
+  for (std::size_t first = 0; first < values.size(); first += kPiece) {
+    std::uint16_t* begin = values.data() + first;
+    std::uint16_t* end = values.data() + std::min(first + kPiece, values.size());
+    larger.insert(larger.end(), begin, end);
+    releasePages(begin, end);
+  }
+  values.swap(larger);
+}
+
+}  // namespace
+
+void BrickSamples::append(const std::vector<Vec3i>& bricks) {
+  if (bricks.empty()) return;
+  Store store{SampleStore(bricks.size() * kCount), bricks[0].z};
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    store.lastZ = std::max(store.lastZ, bricks[i].z);
+    table[places.numberOf(bricks[i])] = std::int32_t(pool.size());
+    placed.push_back({std::int32_t(pool.size()), bricks[i]});
+    pool.push_back(store.samples.data() + i * kCount);
+    ranges.emplace_back();
+  }
+  stores.push_back(std::move(store));
+}
+
+void BrickSamples::separate() {
+  const std::size_t constants = pool.size() - placed.size();
+  if (constants == 1) return;
+  const std::vector<float*> sources = pool;
+  const std::vector<Interval> sourceRanges = ranges;
+  std::vector<Vec3i> bricks;
+  std::vector<std::size_t> source;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const auto constant = std::size_t(table[i]);
+    if (constant == 0 || constant >= constants) continue;
+    bricks.push_back(places.at(i));
+    source.push_back(constant);
+  }
+  pool.erase(pool.begin() + 1, pool.begin() + std::ptrdiff_t(constants));
+  ranges.erase(ranges.begin() + 1, ranges.begin() + std::ptrdiff_t(constants));
+  for (PlacedBrick& brick : placed) {
+    brick.pool -= std::int32_t(constants - 1);
+    table[places.numberOf(brick.brick)] = brick.pool;
+  }
+  const std::size_t first = pool.size();
+  append(bricks);
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    std::copy_n(sources[source[i]], kCount, pool[first + i]);
+    ranges[first + i] = sourceRanges[source[i]];
+  }
+}
+
+std::shared_ptr<BrickGrid> emptyPackedGrid(const BrickSamples& samples) {
+  auto grid = std::make_shared<BrickGrid>();
+  grid->voxelSize = samples.voxelSize;
+  grid->indexToWorld.linear = Mat3f::scaling(samples.voxelSize);
+  grid->worldToIndex.linear = Mat3f::scaling(1.0f / samples.voxelSize);
+  grid->background = samples.background;
+  grid->firstBrick = samples.places.first;
+  grid->brickCount = samples.places.count;
+  grid->table.resize(samples.table.size());
+  grid->codes.resize(kVolume);
+  grid->ranges.push_back(Interval::of(samples.background));
+  return grid;
+}
+
+void encodeBrick(const float* samples, const Interval& range, std::uint16_t* codes) {
+  require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
+  const float low = range.min, width = range.max - low;
+  const float scale = width > 0 ? BrickCode::kLargest / width : 0.0f;
+  for (std::size_t i = 0; i < kVolume; ++i)
+    codes[i] = std::uint16_t(std::min((samples[i] - low) * scale + 0.5f, BrickCode::kLargest));
+}
+
+void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packing>& packing) {
+  std::vector<PlacedBrick> chosen;
+  for (const PlacedBrick& brick : samples.placed)
+    if (packing[std::size_t(brick.pool)] != Packing::leaveOut) chosen.push_back(brick);
+  const auto groupOf = [&](const PlacedBrick& brick) {
+    return (brick.brick.z - samples.places.first.z) / kGroup;
+  };
+  std::stable_sort(chosen.begin(), chosen.end(),
+                   [&](const PlacedBrick& a, const PlacedBrick& b) { return groupOf(a) < groupOf(b); });
+  const std::size_t start = grid.poolSize();
+  reserveFor(grid.codes, (start + chosen.size()) * kVolume);
+  grid.ranges.resize(start + chosen.size());
+  for (std::size_t first = 0; first < chosen.size();) {
+    const int group = groupOf(chosen[first]);
+    std::size_t last = first;
+    while (last < chosen.size() && groupOf(chosen[last]) == group) ++last;
+    grid.codes.resize((start + last) * kVolume);
+    parallelFor(last - first, kBricksPerTask, [&](std::size_t begin, std::size_t end) {
+      std::array<float, kVolume> stored;
+      for (std::size_t i = first + begin; i < first + end; ++i) {
+        const PlacedBrick& brick = chosen[i];
+        withBorders(samples, brick.brick, stored.data());
+        Interval range = rangeOfBrick(stored.data());
+        if (packing[std::size_t(brick.pool)] == Packing::absolute) {
+          for (float& value : stored) value = std::abs(value);
+          range = abs(range);
+        }
+        encodeBrick(stored.data(), range, grid.codes.data() + (start + i) * kVolume);
+        grid.ranges[start + i] = range;
+        grid.table[grid.tableIndex(brick.brick)] = std::int32_t(start + i);
+      }
+    });
+    // The next group reads one brick below its own.
+    const int needed = samples.places.first.z + (group + 1) * kGroup - 1;
+    for (BrickSamples::Store& store : samples.stores)
+      if (store.lastZ < needed) store.samples = {};
+    first = last;
+  }
+}
+
+std::shared_ptr<BrickGrid> packed(BrickSamples samples) {
+  std::shared_ptr<BrickGrid> grid = emptyPackedGrid(samples);
+  grid->table = samples.table;
+  // Constants keep their places.
+  const std::size_t constants = samples.pool.size() - samples.placed.size();
+  grid->codes.resize(constants * kVolume);
+  grid->ranges.assign(samples.ranges.begin(), samples.ranges.begin() + std::ptrdiff_t(constants));
+  for (const Interval& range : grid->ranges)
+    require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
+  const std::vector<Packing> all(samples.pool.size(), Packing::whole);
+  appendPacked(*grid, std::move(samples), all);
+  return grid;
+}
+
+}  // namespace nephele::detail

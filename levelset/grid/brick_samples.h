@@ -1,0 +1,113 @@
+#pragma once
+
+#include <sys/mman.h>
+
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "nephele/levelset/grid/brick_box.h"
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/grid_field.h"
+
+/// Sparse grids while they are made: bricks without the borders that interpolation reads. For the
+/// implementation of bakes.
+namespace nephele::detail {
+
+/// Floats in pages of their own, which go back to the system at once when they are given up.
+class SampleStore {
+ public:
+  SampleStore() = default;
+  explicit SampleStore(std::size_t count) : bytes_(count * sizeof(float)) {
+    if (count == 0) return;
+    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) throw std::bad_alloc();
+    data_ = static_cast<float*>(memory);
+  }
+  SampleStore(SampleStore&& other) noexcept { swap(other); }
+  SampleStore& operator=(SampleStore&& other) noexcept {
+    SampleStore taken(std::move(other));
+    swap(taken);
+    return *this;
+  }
+  ~SampleStore() {
+    if (data_) munmap(data_, bytes_);
+  }
+
+  float* data() const { return data_; }
+  bool contains(const float* p) const { return p >= data_ && p < data_ + bytes_ / sizeof(float); }
+
+ private:
+  void swap(SampleStore& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+  }
+
+  float* data_ = nullptr;
+  std::size_t bytes_ = 0;
+};
+
+/// What a BrickGrid is made from: the same table, and of every brick in the pool its own 8^3 samples, two
+/// fifths of what it stores with borders.
+struct BrickSamples {
+  static constexpr int kCount = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+  /// The samples of some bricks, none of which lies above `lastZ`.
+  struct Store {
+    SampleStore samples;
+    int lastZ;
+  };
+
+  float voxelSize = 1.0f;
+  float background = 0.0f;
+  BrickBox places;
+  /// Index into the pool for each brick of these. Pool brick 0 is all background.
+  std::vector<std::int32_t> table;
+  /// kCount samples of each, x fastest. Bricks of nothing but the background may share those of brick 0.
+  std::vector<float*> pool;
+  /// Of those samples.
+  std::vector<Interval> ranges;
+  /// The bricks that stand at a position of their own, the last of the pool; the others are constants.
+  std::vector<PlacedBrick> placed;
+  std::vector<Store> stores;
+
+  /// Pool index of the brick at brick coordinates `b`; 0 outside the table.
+  std::int32_t poolIndex(const Vec3i& b) const { return places.covers(b) ? table[places.numberOf(b)] : 0; }
+  /// Where sample (x, y, z) of a brick stands among its samples; coordinates 0 to 7.
+  static constexpr int offset(int x, int y, int z) {
+    return (z * BrickGrid::kBrick + y) * BrickGrid::kBrick + x;
+  }
+
+  /// Appends bricks whose samples are yet to be written, in one store, at the end of the pool.
+  void append(const std::vector<Vec3i>& bricks);
+  /// Gives every position but those of pool brick 0 a brick of its own.
+  void separate();
+};
+
+/// `bake` up to the samples. Their order is by z first, in steps of 8 bricks.
+BrickSamples bakeSamples(const ScalarField& field, const BakeOptions& options,
+                         const Progress& progress = silent());
+
+/// A packed grid with the layout of `samples` and without bricks other than the background.
+std::shared_ptr<BrickGrid> emptyPackedGrid(const BrickSamples& samples);
+
+/// What becomes of a brick when it is packed.
+enum class Packing : std::uint8_t {
+  leaveOut,
+  whole,
+  absolute  ///< Of all samples that the brick stores, the absolute value.
+};
+
+/// Appends bricks of `samples` with their borders to a packed grid whose table covers theirs; `packing` has
+/// an entry for every pool brick. The stores are given back while it works, from below in z. Uses all cores.
+/// @throws Error if a sample is not finite.
+void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packing>& packing);
+
+/// What `pack` makes of the grid with these samples.
+std::shared_ptr<BrickGrid> packed(BrickSamples samples);
+
+/// The codes of the kVolume samples of a brick; `range` contains them. @throws Error if it is not finite.
+void encodeBrick(const float* samples, const Interval& range, std::uint16_t* codes);
+
+}  // namespace nephele::detail

@@ -1,0 +1,93 @@
+// The text of OBJ files: shortest decimal forms that read back to the same value (the same float where the
+// value is a float), written without a locale.
+#include "nephele/levelset/io/obj_text.h"
+
+#include <bit>
+#include <charconv>
+#include <unordered_map>
+
+namespace nephele::detail {
+namespace {
+
+// A name on one line, as statements need.
+std::string oneLine(std::string name) {
+  for (char& c : name) c = c == '\n' || c == '\r' ? ' ' : c;
+  return name;
+}
+
+}  // namespace
+
+TextWriter& TextWriter::number(double value) {
+  char digits[32];
+  const auto single = static_cast<float>(value);
+  const auto end = static_cast<double>(single) == value ? std::to_chars(digits, digits + 32, single).ptr
+                                                        : std::to_chars(digits, digits + 32, value).ptr;
+  return text({digits, static_cast<std::size_t>(end - digits)});
+}
+
+TextWriter& TextWriter::integer(std::uint64_t value) {
+  char digits[24];
+  const auto end = std::to_chars(digits, digits + 24, value).ptr;
+  return text({digits, static_cast<std::size_t>(end - digits)});
+}
+
+void TextWriter::flush() {
+  if (!stream_) return;
+  std::fwrite(buffer_.data(), 1, buffer_.size(), stream_);
+  buffer_.clear();
+}
+
+ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& offset) {
+  const MeshAttribute* color = nullptr;
+  const MeshAttribute* uv = nullptr;
+  for (const MeshAttribute& a : mesh.attributes) {
+    if (a.name == "color" && a.domain == MeshAttribute::Domain::vertex && a.width >= 3) color = &a;
+    if (a.name == "uv" && a.width == 2) uv = &a;
+  }
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    out.text("v");
+    const Vec3d p = mesh.positions[v] + offset;
+    for (int k = 0; k < 3; ++k) out.text(" ").number(p[k]);
+    if (color)
+      for (std::size_t k = 0; k < 3; ++k)
+        out.text(" ").number(color->values[v * static_cast<std::size_t>(color->width) + k]);
+    out.text("\n");
+  }
+  ObjCoordinates result;
+  if (!uv) return result;
+  result.index.reserve(mesh.corners.size());
+  std::unordered_map<std::uint64_t, std::uint32_t> known;
+  known.reserve(mesh.positions.size());
+  for (std::size_t c = 0; c < mesh.corners.size(); ++c) {
+    const std::size_t item = uv->domain == MeshAttribute::Domain::corner ? c : mesh.corners[c];
+    const float u = uv->values[2 * item], v = uv->values[2 * item + 1];
+    const std::uint64_t key =
+        std::uint64_t{std::bit_cast<std::uint32_t>(u)} << 32 | std::bit_cast<std::uint32_t>(v);
+    const auto [entry, isNew] = known.try_emplace(key, static_cast<std::uint32_t>(known.size()) + 1);
+    if (isNew) out.text("vt ").number(u).text(" ").number(v).text("\n");
+    result.index.push_back(entry->second);
+  }
+  result.count = static_cast<std::uint32_t>(known.size());
+  return result;
+}
+
+void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, ObjLines lines,
+                   std::uint64_t vertices, std::uint64_t coordinates) {
+  std::size_t group = 0;
+  for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
+    for (; group < mesh.groups.size() && mesh.groups[group].firstFace <= f; ++group) {
+      const MeshGroup& begun = mesh.groups[group];
+      if (lines.groups) out.text("g ").text(oneLine(begun.name)).text("\n");
+      if (lines.materials && !begun.material.empty())
+        out.text("usemtl ").text(oneLine(begun.material)).text("\n");
+    }
+    out.text("f");
+    for (std::uint32_t c = mesh.faceStart[f]; c < mesh.faceStart[f + 1]; ++c) {
+      out.text(" ").integer(vertices + mesh.corners[c] + 1);
+      if (!uv.index.empty()) out.text("/").integer(coordinates + uv.index[c]);
+    }
+    out.text("\n");
+  }
+}
+
+}  // namespace nephele::detail

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "nephele/modeling/base/mesh.h"
+
+// Text of OBJ files. Not for other folders.
+namespace nephele::detail {
+
+/// Text on its way to a file, in large pieces, or kept where there is no file.
+class TextWriter {
+ public:
+  explicit TextWriter(std::FILE* stream = nullptr) : stream_(stream) {}
+  ~TextWriter() { flush(); }
+  TextWriter(const TextWriter&) = delete;
+  TextWriter& operator=(const TextWriter&) = delete;
+
+  TextWriter& text(std::string_view s) {
+    buffer_.append(s);
+    if (stream_ && buffer_.size() > kFlushAt) flush();
+    return *this;
+  }
+  /// The shortest decimal form that reads back to the same value, or the same float where it is one.
+  TextWriter& number(double value);
+  TextWriter& integer(std::uint64_t value);
+
+  const std::string& kept() const { return buffer_; }
+  /// What was kept; the writer is empty then.
+  std::string take() { return std::exchange(buffer_, {}); }
+
+ private:
+  static constexpr std::size_t kFlushAt = 1 << 16;
+
+  void flush();
+
+  std::FILE* stream_;
+  std::string buffer_;
+};
+
+/// Texture coordinates, each written once per value, so that charts stay connected in other programs.
+struct ObjCoordinates {
+  /// Per corner, from 1; empty where the mesh has none.
+  std::vector<std::uint32_t> index;
+  std::uint32_t count = 0;
+};
+
+/// Lines `v` and `vt` of a mesh.
+ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& offset = {});
+
+/// Which lines stand in front of the faces of a group.
+struct ObjLines {
+  bool groups = true;
+  bool materials = false;
+};
+
+/// Lines `f`, for points that are not the first of their file: `vertices` and `coordinates` of them came
+/// before.
+void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, ObjLines lines = {},
+                   std::uint64_t vertices = 0, std::uint64_t coordinates = 0);
+
+}  // namespace nephele::detail

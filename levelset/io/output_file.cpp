@@ -1,0 +1,143 @@
+// Outputs that appear whole or not at all.
+//
+// The temporary is created with O_EXCL (so two processes never share one) and the usual permissions, in the
+// folder of the target, so that rename() is atomic. The temporaries that are open sit in a list whose nodes
+// are never freed and are claimed atomically: the signal handler and the destructor never use a path at
+// once, and the handler needs no lock and no memory.
+#include "nephele/levelset/io/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+namespace {
+
+enum class State { free, open, busy, discarded };
+
+// Nodes are reused but never freed. While a node is open, whoever makes it busy may use its path.
+struct OpenTemporary {
+  std::atomic<State> state{State::free};
+  std::string path;
+  OpenTemporary* next = nullptr;
+};
+
+std::atomic<OpenTemporary*> openTemporaries{nullptr};
+
+static_assert(std::atomic<State>::is_always_lock_free && std::atomic<OpenTemporary*>::is_always_lock_free);
+
+OpenTemporary* enlist(const std::string& path) {
+  OpenTemporary* node = openTemporaries.load();
+  for (State expected = State::free; node; node = node->next, expected = State::free)
+    if (node->state.compare_exchange_strong(expected, State::busy)) break;
+  const bool isNew = node == nullptr;
+  if (isNew) {
+    node = new OpenTemporary;
+    node->state = State::busy;
+  }
+  node->path = path;
+  node->state = State::open;
+  if (isNew) {
+    node->next = openTemporaries.load();
+    while (!openTemporaries.compare_exchange_weak(node->next, node)) {
+    }
+  }
+  return node;
+}
+
+void strike(void* entry) {
+  auto* node = static_cast<OpenTemporary*>(entry);
+  State expected = State::open;
+  while (!node->state.compare_exchange_weak(expected, State::busy) && expected != State::discarded)
+    expected = State::open;  // another thread is discarding it at this moment
+  node->state = State::free;
+}
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
+
+}  // namespace
+
+OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
+  namespace fs = std::filesystem;
+  require(!path_.empty(), "output: the file name is empty");
+  const fs::path target(path_);
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  std::error_code ignored;
+  require(target.has_filename() && !fs::is_directory(target, ignored),
+          fmt::format("cannot write {}: it is a folder", path_));
+  require(fs::exists(folder, ignored),
+          fmt::format("cannot write {}: the folder {} does not exist", path_, folder.string()));
+  require(fs::is_directory(folder, ignored),
+          fmt::format("cannot write {}: {} is not a folder", path_, folder.string()));
+
+  static std::atomic<unsigned> serial{0};
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    const std::string name = fmt::format(".{}.{}-{}{}", target.stem().string().substr(0, 100), ::getpid(),
+                                         serial++, target.extension().string());
+    temporary_ = (folder / name).string();
+    entry_ = enlist(temporary_);
+    const int descriptor = ::open(temporary_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+    const int error = errno;
+    if (descriptor >= 0) {
+      ::close(descriptor);
+      return;
+    }
+    strike(entry_);
+    require(error == EEXIST, fmt::format("cannot write {}: {}", path_, reason(error)));
+  }
+  throw Error(fmt::format("cannot write {}: no free temporary name in {}", path_, folder.string()));
+}
+
+OutputFile::~OutputFile() {
+  if (committed_) return;
+  ::unlink(temporary_.c_str());
+  strike(entry_);
+}
+
+void OutputFile::commit() {
+  require(!committed_, fmt::format("{} is already written", path_));
+  if (std::rename(temporary_.c_str(), path_.c_str()) != 0)
+    throw Error(fmt::format("cannot write {}: {}", path_, reason(errno)));
+  committed_ = true;
+  strike(entry_);
+}
+
+void commitTogether(std::span<OutputFile* const> outputs) {
+  for (std::size_t i = 0; i != outputs.size(); ++i) try {
+      outputs[i]->commit();
+    } catch (const Error&) {
+      for (OutputFile* before : outputs.first(i)) ::unlink(before->path().c_str());
+      throw;
+    }
+}
+
+void discardAllOutputs() noexcept {
+  for (OpenTemporary* node = openTemporaries.load(); node; node = node->next) {
+    State expected = State::open;
+    if (!node->state.compare_exchange_strong(expected, State::busy)) continue;
+    ::unlink(node->path.c_str());
+    node->state = State::discarded;
+  }
+  // Folders, once they are empty; a path that was a file is gone.
+  for (OpenTemporary* node = openTemporaries.load(); node; node = node->next)
+    if (node->state == State::discarded) ::rmdir(node->path.c_str());
+}
+
+detail::OpenOutput::OpenOutput(const std::string& path) : entry_(enlist(path)) {}
+
+detail::OpenOutput::~OpenOutput() {
+  strike(entry_);
+}
+
+}  // namespace nephele

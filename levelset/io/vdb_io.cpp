@@ -1,0 +1,180 @@
+// Reading and writing volume files: choice of grids, messages, metadata. The parsing is in vdb_archive.cpp
+// and nano_vdb.cpp.
+#include "nephele/levelset/io/vdb_io.h"
+
+#include <fmt/format.h>
+#include <openvdb/io/File.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/io/output_file.h"
+
+namespace nephele {
+
+namespace {
+
+[[noreturn]] void failReading(const std::string& path, const std::string& reason) {
+  throw Error(fmt::format("{}: {}", path, reason));
+}
+
+void checkReadable(const std::string& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) failReading(path, "no such file");
+  if (std::filesystem::is_directory(status)) failReading(path, "is a folder, not a volume");
+  if (!std::ifstream(path).good()) failReading(path, "cannot be opened for reading");
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error) failReading(path, error.message());
+  if (size == 0) failReading(path, "the file is empty");
+}
+
+/// Turns what OpenVDB, NanoVDB and the standard library throw while reading into one line with the path.
+template <class Body>
+auto translateReadErrors(const std::string& path, const Body& body) {
+  try {
+    return body();
+  } catch (const Error& e) {
+    if (std::string_view(e.what()).starts_with(path)) throw;
+    failReading(path, e.what());
+  } catch (const std::bad_alloc&) {
+    failReading(path, "damaged, or too large for the memory of this machine");
+  } catch (const std::exception& e) {
+    std::string reason = e.what();
+    for (char& c : reason)
+      if (c == '\n' || c == '\t') c = ' ';
+    failReading(path, reason);
+  }
+}
+
+std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const detail::WantedGrid& wanted) {
+  checkReadable(path);
+  detail::initializeOpenVdb();
+  return translateReadErrors(path, [&] {
+    return path.ends_with(".nvdb") ? detail::readNanoVdb(path) : detail::readOpenVdb(path, wanted);
+  });
+}
+
+std::string listGrids(const std::vector<openvdb::GridBase::Ptr>& grids) {
+  if (grids.empty()) return "it holds no grid";
+  std::string list;
+  for (const auto& grid : grids)
+    list += fmt::format("{}'{}' ({})", list.empty() ? "" : ", ", grid->getName(), grid->valueType());
+  return "it holds " + list;
+}
+
+bool isScalar(const openvdb::GridBase& grid) {
+  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
+}
+
+// One float grid per component, with the tree's own tiles.
+template <class VectorGrid>
+std::array<VdbGrid, 3> components(const VectorGrid& grid) {
+  const auto component = [&](int axis) {
+    const auto background = float(grid.background()[axis]);
+    const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree(), background, openvdb::TopologyCopy());
+    const auto values = grid.getConstAccessor();
+    for (auto voxel = tree->beginValueOn(); voxel; ++voxel)
+      voxel.setValue(float(values.getValue(voxel.getCoord())[axis]));
+    const auto scalar = openvdb::FloatGrid::create(tree);
+    scalar->insertMeta(grid);
+    scalar->setGridClass(openvdb::GRID_UNKNOWN);
+    const auto transform = grid.transform().copy();
+    if (grid.getGridClass() == openvdb::GRID_STAGGERED) {
+      openvdb::Vec3d shift(0, 0, 0);
+      shift[axis] = -0.5;
+      transform->preTranslate(shift);
+    }
+    scalar->setTransform(transform);
+    scalar->setName(fmt::format("{}.{}", grid.getName(), "xyz"[axis]));
+    return detail::wrapGrid(scalar);
+  };
+  return {component(0), component(1), component(2)};
+}
+
+}  // namespace
+
+std::vector<VdbGrid> readVdbFile(const std::string& path) {
+  std::vector<VdbGrid> result;
+  for (const auto& grid : readGrids(path, [](const auto&, const auto&) { return true; }))
+    result.push_back(detail::wrapGrid(grid));
+  return result;
+}
+
+VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
+  // Only the values of one grid are read.
+  bool found = false;
+  const auto wanted = [&](const openvdb::GridBase& type, const std::string& gridName) {
+    const bool fits = !found && isScalar(type) && (name.empty() || gridName == name);
+    found |= fits;
+    return fits;
+  };
+  const auto grids = readGrids(path, wanted);
+  for (const auto& grid : grids) {
+    if (!name.empty() && grid->getName() != name) continue;
+    if (isScalar(*grid))
+      return translateReadErrors(path, [&] { return detail::wrapGrid(detail::toFloatGrid(grid)); });
+    if (!name.empty())
+      failReading(path, fmt::format("grid '{}' holds {} values; a scalar (float or double) grid is needed",
+                                    name, grid->valueType()));
+  }
+  if (name.empty()) failReading(path, "no scalar (float or double) grid; " + listGrids(grids));
+  failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
+}
+
+std::array<VdbGrid, 3> vectorComponents(const VdbGrid& handle) {
+  const openvdb::GridBase::Ptr& grid = handle.impl().grid;
+  if (grid->isType<openvdb::Vec3SGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
+  if (grid->isType<openvdb::Vec3DGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
+  throw Error(fmt::format("grid '{}' holds {} values; a grid of vectors is needed", grid->getName(),
+                          grid->valueType()));
+}
+
+std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name) {
+  const auto grids =
+      readGrids(path, [&](const auto&, const std::string& gridName) { return gridName == name; });
+  for (const auto& grid : grids) {
+    if (grid->getName() != name) continue;
+    return translateReadErrors(path, [&] { return vectorComponents(detail::wrapGrid(grid)); });
+  }
+  failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
+}
+
+void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
+                  const std::map<std::string, std::string>& metadata) {
+  detail::initializeOpenVdb();
+  require(!grids.empty(), path + ": no grid to write");
+  openvdb::GridPtrVec labelled;
+  for (const VdbGrid& grid : grids) {
+    // Shares the tree: only the metadata of what is written differs.
+    openvdb::GridBase::Ptr copy = grid.impl().grid->copyGrid();
+    for (const auto& other : labelled)
+      require(other->getName() != copy->getName(),
+              fmt::format("{}: two grids are called '{}'", path, copy->getName()));
+    for (const auto& [key, value] : metadata) {
+      copy->removeMeta(key);
+      copy->insertMeta(key, openvdb::StringMetadata(value));
+    }
+    labelled.push_back(copy);
+  }
+  OutputFile output(path);
+  try {
+    openvdb::io::File file(output.temporaryPath());
+    file.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |
+                        (openvdb::io::Archive::hasBloscCompression() ? openvdb::io::COMPRESS_BLOSC
+                                                                     : openvdb::io::COMPRESS_ZIP));
+    file.write(labelled);
+    file.close();
+    // OpenVDB does not look whether its stream failed: what it wrote must hold what it announces.
+    detail::readOpenVdb(output.temporaryPath(), [](const auto&, const auto&) { return false; });
+  } catch (const Error&) {
+    throw Error(fmt::format("{}: cannot be written whole; the disk may be full", path));
+  } catch (const std::exception& e) {
+    throw Error(fmt::format("{}: cannot be written: {}", path, e.what()));
+  }
+  output.commit();
+}
+
+}  // namespace nephele

@@ -1,0 +1,50 @@
+// OpenVDB's dual mesher: one vertex in each cell that the surface crosses, quads between the four cells round
+// a crossed edge, and where the surface is flat to within the adaptivity, several cells share one vertex.
+//
+// OpenVDB takes level sets as negative inside and all other grids as inside where the value is high, and
+// winds polygons clockwise seen from outside; here both become the conventions of the library.
+//
+// Limits: OpenVDB's merging can leave edges with more than two faces, and vertices are smoothed off the zero
+// of the interpolant; where a closed manifold is needed, take marching cubes.
+#include <openvdb/tools/VolumeToMesh.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+
+namespace nephele {
+
+Mesh adaptiveMesh(const VdbGrid& grid, double isovalue, double adaptivity) {
+  require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + std::to_string(isovalue));
+  require(adaptivity >= 0 && adaptivity <= 1,
+          "adaptiveMesh: adaptivity must be in [0, 1], got " + std::to_string(adaptivity));
+  const openvdb::FloatGrid::ConstPtr values = detail::floatGrid(grid);
+  const bool isLevelSet = values->getGridClass() == openvdb::GRID_LEVEL_SET;
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quads;
+  try {
+    openvdb::tools::volumeToMesh(*values, points, triangles, quads, isLevelSet ? -isovalue : isovalue,
+                                 adaptivity);
+  } catch (const openvdb::Exception& problem) {
+    throw Error("adaptiveMesh: " + std::string(problem.what()));
+  }
+  require(4 * std::uint64_t(quads.size()) + 3 * std::uint64_t(triangles.size()) <
+              std::numeric_limits<std::uint32_t>::max(),
+          "adaptiveMesh: the surface has more polygons than a mesh can number; use larger voxels");
+
+  Mesh mesh;
+  mesh.positions.reserve(points.size());
+  for (const openvdb::Vec3s& p : points) mesh.positions.push_back({p.x(), p.y(), p.z()});
+  mesh.corners.reserve(4 * quads.size() + 3 * triangles.size());
+  mesh.faceStart.reserve(quads.size() + triangles.size() + 1);
+  for (const openvdb::Vec4I& q : quads) mesh.addFace(std::array{q[3], q[2], q[1], q[0]});
+  for (const openvdb::Vec3I& t : triangles) mesh.addFace(std::array{t[2], t[1], t[0]});
+  return mesh;
+}
+
+}  // namespace nephele

@@ -1,0 +1,55 @@
+// Alpha wrapping of a triangle soup.
+//
+// Portaneri, Rouxel-Labbe, Hemmer, Cohen-Steiner and Alliez, "Alpha Wrapping with an Offset" (ACM TOG 2022),
+// as CGAL implements it: a Delaunay triangulation is carved from outside while empty balls of radius alpha
+// pass, and refined against the offset surface. The result encloses the soup strictly, so thin sheets become
+// shells of twice the offset and hollows behind small openings are filled. Here in its own file because it
+// takes long to compile.
+#include "nephele/levelset/mesh/detail/mesh_wrap.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/alpha_wrap_3.h>
+
+#include <array>
+#include <vector>
+
+#include "nephele/modeling/base/error.h"
+
+namespace nephele::detail {
+
+Mesh wrapped(const Mesh& triangles, double alpha, double offset) {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using Point = Kernel::Point_3;
+  std::vector<Point> points;
+  for (const Vec3d& p : triangles.positions) points.emplace_back(p.x, p.y, p.z);
+  std::vector<std::array<std::size_t, 3>> faces;
+  for (std::size_t f = 0; f < triangles.faceCount(); ++f) {
+    const auto face = triangles.face(f);
+    // The wrap's own test for triangles without area prints; leave them out first.
+    if (!CGAL::collinear(points[face[0]], points[face[1]], points[face[2]]))
+      faces.push_back({face[0], face[1], face[2]});
+  }
+  require(!faces.empty(), "mesh repair: every triangle is degenerate, there is nothing to wrap");
+
+  CGAL::Surface_mesh<Point> wrap;
+  try {
+    CGAL::alpha_wrap_3(points, faces, alpha, offset, wrap);
+  } catch (const std::exception& error) {
+    throw Error(std::string("mesh repair: alpha wrapping failed: ") + error.what());
+  }
+  Mesh result;
+  for (const auto vertex : wrap.vertices()) {
+    const Point& p = wrap.point(vertex);
+    result.positions.emplace_back(p.x(), p.y(), p.z());
+  }
+  for (const auto face : wrap.faces()) {
+    std::vector<std::uint32_t> corners;
+    for (const auto vertex : wrap.vertices_around_face(wrap.halfedge(face)))
+      corners.push_back(static_cast<std::uint32_t>(vertex.idx()));
+    result.addFace(corners);
+  }
+  return result;
+}
+
+}  // namespace nephele::detail

@@ -1,0 +1,40 @@
+#pragma once
+
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/mesh.h"
+
+namespace nephele {
+
+/// Triangles of the surface where `grid` equals `isovalue`, oriented outward from higher to lower values
+/// (from the inside of a shape, positive, to its outside): counter-clockwise seen from outside.
+///
+/// The result is a closed manifold that does not intersect itself, whatever the samples: every edge has two
+/// triangles, every vertex one fan, also on noise. Where the inside reaches the end of the table, the
+/// background outside closes it within one voxel; if the background itself is inside, the mesh bounds the
+/// cavities and its volume is negative.
+///
+/// Vertices are shared. They lie on grid edges at the zero of the linear interpolation, but at least 1/4096
+/// voxel from the ends of the edge, so that no two coincide and no triangle has zero area. (Cells whose
+/// ambiguous faces are decided in different ways can need one vertex inside: none on smooth shapes, one
+/// vertex in 70 on white noise.) Samples equal to the isovalue count as outside. A face of a
+/// cell with two inside corners diagonal to each other joins them if the saddle of the bilinear interpolant
+/// on the face is inside; both cells of a face decide alike.
+///
+/// Positions are computed in double precision, by indexToWorld. Cost and memory grow with the bricks that the
+/// surface crosses; all cores; the same mesh at any thread count.
+/// @throws Error if isovalue is not finite, samples near the surface are NaN, the table or pool do not fit
+/// the grid's size, or the surface has more than 1.4 billion triangles; Cancelled.
+Mesh marchingCubes(const BrickGrid& grid, float isovalue = 0.0f, const Progress& progress = silent());
+
+/// The same surface by OpenVDB's dual mesher: quads and triangles, fewer and larger where the surface is
+/// flat.
+///
+/// `isovalue` has the sign of the library: for a level set it is the distance in world units by which the
+/// surface moves inwards, so that `marchingCubes(*toBricks(grid), v)` and `adaptiveMesh(grid, v, a)` show one
+/// surface; for other grids it is the value that the inside exceeds. `adaptivity` goes from 0 (one vertex per
+/// cell) to 1. Oriented outward. With adaptivity > 0, and on surfaces that the grid does not resolve, edges
+/// with more than two faces are possible.
+/// @throws Error if adaptivity is outside [0, 1], isovalue is not finite or the grid does not hold floats.
+Mesh adaptiveMesh(const VdbGrid& grid, double isovalue, double adaptivity);
+
+}  // namespace nephele

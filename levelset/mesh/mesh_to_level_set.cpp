@@ -1,0 +1,170 @@
+// Mesh to narrow-band level set.
+//
+// The distance itself comes from signedBand (mesh_band.cpp). Where that finds that sheets of the
+// mesh overlap, so that the nearest sheet does not tell inside from outside, OpenVDB's meshToVolume takes
+// over: it floods from the outside and keeps the outer sheets.
+//
+// The enclosed volume of the result is compared with the mesh's: an open mesh, or one too thin for the voxel
+// size, loses its sign without any other sign of trouble. The volume sums a share per voxel that rises
+// linearly with distance, over one voxel and over two; (4 narrow - wide) / 3 cancels the error that curvature
+// makes, and both are exact for planes along the axes. It needs a band of 1 voxel, and holds for displaced
+// surfaces too, whose slope scales both ramps alike.
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+
+#include <fmt/format.h>
+#include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/mesh/mesh_band.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr double kVolumeTolerance = 0.01;
+
+/// The mesh as OpenVDB asks for it, without a copy.
+class MeshAdapter {
+ public:
+  MeshAdapter(const Mesh& mesh, double voxelSize) : mesh_(mesh), perVoxel_(1.0 / voxelSize) {}
+
+  std::size_t polygonCount() const { return mesh_.faceCount(); }
+  std::size_t pointCount() const { return mesh_.positions.size(); }
+  std::size_t vertexCount(std::size_t) const { return 3; }
+  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& position) const {
+    const Vec3d& p = mesh_.positions[mesh_.corners[3 * n + v]];
+    position = openvdb::Vec3d(p.x, p.y, p.z) * perVoxel_;
+  }
+
+ private:
+  const Mesh& mesh_;
+  double perVoxel_;
+};
+
+using FloatTree = openvdb::FloatTree;
+
+/// The share of a voxel that is inside, by its signed distance in voxels, positive inside; 0 below -1, 1
+/// above 1.
+double insideShare(double u) {
+  const double narrow = std::clamp(0.5 + u, 0.0, 1.0), wide = std::clamp(0.5 + 0.5 * u, 0.0, 1.0);
+  return (4.0 * narrow - wide) / 3.0;
+}
+
+void checkVolume(const Mesh& mesh, const VdbGrid& grid, double voxelSize, const Progress& progress) {
+  const double meshVolume = signedVolume(mesh);
+  const double gridVolume = enclosedVolume(grid);
+  if (std::abs(gridVolume / meshVolume - 1.0) < kVolumeTolerance) return;
+  // Triangles of parts that overlap count the overlap twice; the solid they bound counts it once.
+  progress.begin("volume of the solid");
+  const double solid = solidVolume(mesh);
+  const double error = std::abs(gridVolume / solid - 1.0);
+  if (error < kVolumeTolerance) {
+    progress.note(fmt::format(
+        "parts of the mesh overlap, so that the volume of its triangles ({:.6g}) is not that of the "
+        "solid ({:.6g}); the level set encloses {:.6g}",
+        meshVolume, solid, gridVolume));
+    return;
+  }
+  // The error of a shape that is thin for its voxels falls with the square of their size.
+  const double longest = boundingBox(mesh).longestSide();
+  const double better = voxelSize * std::min(0.5, std::sqrt(0.5 * kVolumeTolerance / error));
+  throw Error(fmt::format(
+      "level set: it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart, 1 % allowed): the "
+      "shape is too thin for a voxel size of {:.4g}; try resolution {:.0f} (voxel size {:.4g})",
+      gridVolume, solid, 100 * error, voxelSize, std::ceil(longest / better), better));
+}
+
+void checkMesh(const Mesh& mesh) {
+  require(mesh.faceCount() > 0, "level set: the mesh has no faces");
+  require(mesh.isTriangles(), "level set: the mesh must be triangulated");
+  for (const Vec3d& p : mesh.positions)
+    require(isFinite(p), "level set: the mesh has positions that are not finite");
+}
+
+}  // namespace
+
+namespace detail {
+
+VdbGrid meshToVdb(const Mesh& mesh, const BandOptions& options, const Progress& progress) {
+  initializeOpenVdb();
+  const double h = options.voxelSize;
+  try {
+    Interrupter interrupter(progress);
+    const auto transform = openvdb::math::Transform::createLinearTransform(h);
+    auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, MeshAdapter(mesh, h),
+                                                                 *transform, float(options.exteriorVoxels),
+                                                                 float(options.interiorVoxels));
+    progress.check();
+    return wrapGrid(grid);
+  } catch (const openvdb::Exception& e) {
+    throw Error(fmt::format("level set: OpenVDB: {}", e.what()));
+  }
+}
+
+}  // namespace detail
+
+double enclosedVolume(const VdbGrid& levelSet) {
+  const openvdb::FloatGrid::ConstPtr grid = detail::floatGrid(levelSet);
+  const FloatTree& tree = grid->tree();
+  const double voxel = std::abs(double(determinant(detail::affineOf(*grid).linear)));
+  const double perVoxel = -1.0 / std::cbrt(voxel);
+  const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
+  // Fixed pieces, summed in order: the same sum at any thread count.
+  constexpr std::size_t kPiece = 64;
+  std::vector<double> pieces((leaves.leafCount() + kPiece - 1) / kPiece);
+  parallelFor(leaves.leafCount(), kPiece, [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const float* values = leaves.leaf(i).buffer().data();
+      for (openvdb::Index k = 0; k < FloatTree::LeafNodeType::SIZE; ++k)
+        sum += insideShare(perVoxel * double(values[k]));
+    }
+    pieces[begin / kPiece] = sum;
+  });
+  double voxels = std::accumulate(pieces.begin(), pieces.end(), 0.0);
+  auto tiles = tree.cbeginValueAll();
+  tiles.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tiles; ++tiles)
+    if (*tiles < 0) voxels += double(tiles.getVoxelCount());
+  return voxels * voxel;
+}
+
+double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options) {
+  // Bricks that a slab of the band's width touches, by area; per brick its samples, its leaf and the
+  // triangles near it.
+  constexpr double kBrickBytes = 9000.0;
+  constexpr double kTableBytes = 12.0;
+  const double brick = BrickGrid::kBrick * options.voxelSize;
+  const Vec3d size = Vec3d(boundingBox(mesh).size()) / brick;
+  const double bandBricks = 2.0 * (options.halfWidthVoxels + BrickGrid::kBrick) / BrickGrid::kBrick;
+  const double bricks = surfaceArea(mesh) / (brick * brick) * bandBricks;
+  const double table = (size.x + bandBricks) * (size.y + bandBricks) * (size.z + bandBricks);
+  return std::min(bricks, table) * kBrickBytes + table * kTableBytes + 100.0 * double(mesh.corners.size());
+}
+
+VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options, const Progress& progress) {
+  const double h = options.voxelSize;
+  require(std::isfinite(h) && h > 0, fmt::format("level set: the voxel size must be > 0, got {}", h));
+  require(std::isfinite(options.halfWidthVoxels) && options.halfWidthVoxels >= 1,
+          fmt::format("level set: the half-width must be at least 1 voxel, got {}", options.halfWidthVoxels));
+  checkMesh(mesh);
+  progress.begin("level set");
+  const detail::BandOptions bandOptions{h, options.halfWidthVoxels, options.halfWidthVoxels};
+  const detail::SurfaceGeometry surface = detail::surfaceGeometry(mesh);
+  require(surface.closed, "level set: the mesh is not closed, so that it has no inside; repair it first");
+  std::optional<detail::BandBlocks> band = detail::signedBand(surface, bandOptions, progress);
+  VdbGrid grid = band ? detail::bandToVdb(*band) : detail::meshToVdb(mesh, bandOptions, progress);
+  band.reset();
+  grid.impl().grid->setName("surface");
+  checkVolume(mesh, grid, h, progress);
+  return grid;
+}
+
+}  // namespace nephele

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/field/field.h"
+
+namespace nephele {
+
+struct MeshToLevelSetOptions {
+  /// World units, > 0.
+  double voxelSize = 0.0;
+  /// Band in voxels on either side of the surface, >= 1.
+  double halfWidthVoxels = 3.0;
+};
+
+/// Signed distance to a closed, outward-oriented triangle mesh in a narrow band: the file form.
+/// Exact to float rounding where the sheets of the mesh do not overlap; else OpenVDB's union of them, with a
+/// note.
+/// @throws Error if the mesh is not closed, or if the grid's volume differs from the mesh's by 1 % or more
+/// (where that is defined), naming both and a voxel size to try; Cancelled.
+VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
+                       const Progress& progress = silent());
+
+/// Memory that `meshToLevelSet` will need at its peak, estimated from the area of the mesh: within a factor
+/// of two.
+double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options);
+
+struct MeshDistanceOptions {
+  /// Finest voxel, world units: used within a few voxels of the surface.
+  double voxelSize = 0.0;
+  /// World units outside (inside) the surface up to which the distance must hold.
+  double exteriorBand = 0.0;
+  double interiorBand = 0.0;
+};
+
+/// Signed distance to a closed mesh as a field, positive inside, world units.
+///
+/// Fine bricks near the surface and coarser levels behind them, each twice the voxel size of the one before,
+/// within 0.05 fine voxels of the exact distance away from the medial axis. Beyond the bands: the constant at
+/// its edge. Memory follows the surface, not the width of the band.
+ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options,
+                         const Progress& progress = silent());
+
+/// Volume enclosed by the zero surface of a level set, world units cubed.
+double enclosedVolume(const VdbGrid& levelSet);
+
+}  // namespace nephele

@@ -1,0 +1,29 @@
+#include "nephele/modeling/base/parallel.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+
+namespace nephele {
+
+void parallelFor(std::size_t count, std::size_t grain,
+                 const std::function<void(std::size_t, std::size_t)>& body, const Progress& progress) {
+  if (count == 0) return;
+  const std::size_t pieceSize = grain > 0 ? grain : 1;
+  const std::size_t pieces = (count + pieceSize - 1) / pieceSize;
+  std::atomic<std::size_t> finished{0};
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, pieces, 1),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t piece = range.begin(); piece != range.end(); ++piece) {
+          progress.check();
+          const std::size_t begin = piece * pieceSize;
+          body(begin, begin + pieceSize < count ? begin + pieceSize : count);
+          progress.advance(double(finished.fetch_add(1) + 1) / double(pieces));
+        }
+      },
+      tbb::simple_partitioner{});
+}
+
+}  // namespace nephele

@@ -1,0 +1,519 @@
+// Lane kernels of scalar operations, for every instruction set that the machine may have, chosen when the
+// program runs (Highway).
+//
+// An operation is a struct: `value`, and for the gradient `chain`, which applies the chain rule to one axis.
+// Sums and products are never fused, so exactly rounded operations give the same bits on every machine and
+// equal the scalar truth. exp, log, sin and cos are polynomials of Highway's math library with the ends of
+// their domains mended here; arguments of sin and cos above 39000 go to the C library. Functions that are
+// rarely hot (tan, asin, acos, atan, atan2, pow) are plain loops over the C library.
+#include "nephele/modeling/field/detail/field_kernels.h"
+
+#include <cmath>
+#include <cstddef>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "modeling/field/detail/field_kernels.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, as it decides what they define.
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace nephele::detail {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// At most 16 floats, so that a multiple of 16 needs no tail.
+using D = hn::CappedTag<float, 16>;
+using V = hn::Vec<D>;
+
+HWY_INLINE V constant(float v) {
+  return hn::Set(D(), v);
+}
+// Not Ne(a, a), which is false for NaN on some instruction sets.
+HWY_INLINE auto isNaN(V a) {
+  return hn::Not(hn::Eq(a, a));
+}
+
+struct AddOp {
+  HWY_INLINE V value(V a, V b) const { return hn::Add(a, b); }
+  HWY_INLINE V chain(V, V, V, V ga, V gb) const { return hn::Add(ga, gb); }
+};
+struct SubtractOp {
+  HWY_INLINE V value(V a, V b) const { return hn::Sub(a, b); }
+  HWY_INLINE V chain(V, V, V, V ga, V gb) const { return hn::Sub(ga, gb); }
+};
+struct MultiplyOp {
+  HWY_INLINE V value(V a, V b) const { return hn::Mul(a, b); }
+  HWY_INLINE V chain(V a, V b, V, V ga, V gb) const { return hn::Add(hn::Mul(b, ga), hn::Mul(a, gb)); }
+};
+struct DivideOp {
+  HWY_INLINE V value(V a, V b) const { return hn::Div(a, b); }
+  HWY_INLINE V chain(V, V b, V v, V ga, V gb) const { return hn::Div(hn::Sub(ga, hn::Mul(v, gb)), b); }
+};
+struct MinimumOp {
+  // True where the result is a: a is smaller, or b is NaN.
+  static HWY_INLINE auto first(V a, V b) { return hn::Or(hn::Lt(a, b), isNaN(b)); }
+  HWY_INLINE V value(V a, V b) const { return hn::IfThenElse(first(a, b), a, b); }
+  HWY_INLINE V chain(V a, V b, V, V ga, V gb) const { return hn::IfThenElse(first(a, b), ga, gb); }
+};
+struct MaximumOp {
+  static HWY_INLINE auto first(V a, V b) { return hn::Or(hn::Gt(a, b), isNaN(b)); }
+  HWY_INLINE V value(V a, V b) const { return hn::IfThenElse(first(a, b), a, b); }
+  HWY_INLINE V chain(V a, V b, V, V ga, V gb) const { return hn::IfThenElse(first(a, b), ga, gb); }
+};
+struct BlendOp {
+  V radius, quarter, half;
+  explicit HWY_INLINE BlendOp(Parameters p)
+      : radius(constant(p.p)), quarter(constant(0.25f / p.p)), half(constant(0.5f / p.p)) {}
+  HWY_INLINE V value(V a, V b) const {
+    const V overlap = hn::Sub(radius, hn::Abs(hn::Sub(a, b)));
+    const V inside = hn::IfThenElseZero(hn::Gt(overlap, hn::Zero(D())), overlap);
+    return hn::Add(MaximumOp().value(a, b), hn::Mul(hn::Mul(inside, inside), quarter));
+  }
+  HWY_INLINE V chain(V a, V b, V, V ga, V gb) const {
+    const V t = hn::Add(constant(0.5f), hn::Mul(hn::Sub(a, b), half));
+    const V above = hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), t);
+    const V wa = hn::IfThenElse(hn::Lt(above, constant(1)), above, constant(1));
+    return hn::Add(hn::Mul(wa, ga), hn::Mul(hn::Sub(constant(1), wa), gb));
+  }
+};
+
+struct NegateOp {
+  HWY_INLINE V value(V a) const { return hn::Neg(a); }
+  HWY_INLINE V chain(V, V, V g) const { return hn::Neg(g); }
+};
+struct AbsoluteOp {
+  HWY_INLINE V value(V a) const { return hn::Abs(a); }
+  HWY_INLINE V chain(V a, V, V g) const { return hn::IfThenElse(hn::Lt(a, hn::Zero(D())), hn::Neg(g), g); }
+};
+struct SquareOp {
+  HWY_INLINE V value(V a) const { return hn::Mul(a, a); }
+  HWY_INLINE V chain(V a, V, V g) const { return hn::Mul(hn::Add(a, a), g); }
+};
+struct SquareRootOp {
+  HWY_INLINE V value(V a) const { return hn::Sqrt(a); }
+  HWY_INLINE V chain(V, V v, V g) const { return hn::Mul(hn::Div(constant(0.5f), v), g); }
+};
+struct ExponentialOp {
+  HWY_INLINE V value(V a) const {
+    // What the polynomial is not made for is replaced first: converting it to integers is undefined.
+    const V usual = hn::IfThenElseZero(hn::Lt(hn::Abs(a), constant(110)), a);
+    V e = hn::IfThenElse(hn::Gt(a, constant(88.7228317f)), constant(HUGE_VALF), hn::Exp(D(), usual));
+    e = hn::IfThenZeroElse(hn::Lt(a, constant(-104)), e);
+    return hn::IfThenElse(isNaN(a), a, e);
+  }
+  HWY_INLINE V chain(V, V v, V g) const { return hn::Mul(v, g); }
+};
+struct LogarithmOp {
+  HWY_INLINE V value(V a) const {
+    const V inf = constant(HUGE_VALF), zero = hn::Zero(D());
+    const auto usual = hn::And(hn::Gt(a, zero), hn::Lt(a, inf));
+    V l = hn::IfThenElse(usual, hn::Log(D(), hn::IfThenElse(usual, a, constant(1))), a);  // +inf and NaN stay
+    l = hn::IfThenElse(hn::Eq(a, zero), hn::Neg(inf), l);
+    return hn::IfThenElse(hn::Lt(a, zero), constant(std::nanf("")), l);
+  }
+  HWY_INLINE V chain(V a, V, V g) const { return hn::Div(g, a); }
+};
+
+constexpr float kLargestReducible = 39000.0f;
+
+/// `v`, with the lanes whose argument is too large for the polynomial replaced.
+template <class F>
+HWY_INLINE V mendLarge(V a, V v, F scalar) {
+  const V limit = constant(kLargestReducible);
+  if (HWY_LIKELY(hn::AllTrue(D(), hn::Le(hn::Abs(a), limit)))) return v;
+  HWY_ALIGN float arguments[16];
+  HWY_ALIGN float results[16];
+  hn::Store(a, D(), arguments);
+  hn::Store(v, D(), results);
+  for (std::size_t i = 0; i < hn::Lanes(D()); ++i)
+    if (!(std::fabs(arguments[i]) <= kLargestReducible)) results[i] = scalar(arguments[i]);
+  return hn::Load(D(), results);
+}
+
+HWY_INLINE V sine(V a) {
+  const V limit = constant(kLargestReducible);
+  const V reducible = hn::IfThenElseZero(hn::Le(hn::Abs(a), limit), a);
+  return mendLarge(a, hn::Sin(D(), reducible), [](float x) { return std::sin(x); });
+}
+HWY_INLINE V cosine(V a) {
+  const V limit = constant(kLargestReducible);
+  const V reducible = hn::IfThenElseZero(hn::Le(hn::Abs(a), limit), a);
+  return mendLarge(a, hn::Cos(D(), reducible), [](float x) { return std::cos(x); });
+}
+
+struct SineOp {
+  HWY_INLINE V value(V a) const { return sine(a); }
+  HWY_INLINE V chain(V a, V, V g) const { return hn::Mul(cosine(a), g); }
+};
+struct CosineOp {
+  HWY_INLINE V value(V a) const { return cosine(a); }
+  HWY_INLINE V chain(V a, V, V g) const { return hn::Neg(hn::Mul(sine(a), g)); }
+};
+struct FloorOp {
+  HWY_INLINE V value(V a) const { return hn::Floor(a); }
+  HWY_INLINE V chain(V, V, V) const { return hn::Zero(D()); }
+};
+struct MaskOp {
+  HWY_INLINE V value(V a) const { return hn::IfThenElseZero(hn::Gt(a, hn::Zero(D())), constant(1)); }
+  HWY_INLINE V chain(V, V, V) const { return hn::Zero(D()); }
+};
+struct ClampOp {
+  V low, high;
+  explicit HWY_INLINE ClampOp(Parameters p) : low(constant(p.p)), high(constant(p.q)) {}
+  HWY_INLINE V value(V a) const {
+    const V m = hn::IfThenElse(hn::Gt(a, low), a, low);
+    return hn::IfThenElse(hn::Lt(m, high), m, high);
+  }
+  HWY_INLINE V chain(V a, V, V g) const {
+    return hn::IfThenElseZero(hn::And(hn::Gt(a, low), hn::Lt(a, high)), g);
+  }
+};
+struct SmoothstepOp {
+  V low, scale;
+  explicit HWY_INLINE SmoothstepOp(Parameters p) : low(constant(p.p)), scale(constant(1 / (p.q - p.p))) {}
+  HWY_INLINE V parameter(V a) const {
+    const V t = hn::Mul(hn::Sub(a, low), scale);
+    const V m = hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), t);
+    return hn::IfThenElse(hn::Lt(m, constant(1)), m, constant(1));
+  }
+  HWY_INLINE V value(V a) const {
+    const V t = parameter(a);
+    return hn::Mul(hn::Mul(t, t), hn::Sub(constant(3), hn::Add(t, t)));
+  }
+  HWY_INLINE V chain(V a, V, V g) const {
+    const V t = parameter(a);
+    const V slope = hn::Mul(hn::Mul(hn::Mul(constant(6), t), hn::Sub(constant(1), t)), scale);
+    return hn::Mul(slope, g);
+  }
+};
+
+template <class Op>
+void unaryLoop(const Op op, const float* a, float* out, int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) hn::Store(op.value(hn::Load(d, a + i)), d, out + i);
+}
+
+template <class Op>
+void unaryGradLoop(const Op op, const float* a, float* out, float* const g[3], int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V x = hn::Load(d, a + i);
+    const V v = op.value(x);
+    for (int k = 0; k < 3; ++k) hn::Store(op.chain(x, v, hn::Load(d, g[k] + i)), d, g[k] + i);
+    hn::Store(v, d, out + i);
+  }
+}
+
+template <class Op>
+void binaryLoop(const Op op, const float* a, const float* b, float* out, int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d)))
+    hn::Store(op.value(hn::Load(d, a + i), hn::Load(d, b + i)), d, out + i);
+}
+
+template <class Op>
+void binaryGradLoop(const Op op, const float* a, const float* b, float* out, float* const ga[3],
+                    const float* const gb[3], int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V x = hn::Load(d, a + i), y = hn::Load(d, b + i);
+    const V v = op.value(x, y);
+    for (int k = 0; k < 3; ++k)
+      hn::Store(op.chain(x, y, v, hn::Load(d, ga[k] + i), hn::Load(d, gb[k] + i)), d, ga[k] + i);
+    hn::Store(v, d, out + i);
+  }
+}
+
+/// Calls body(operation) for the operations that have lane kernels.
+template <class Body>
+void withUnary(Unary op, Parameters p, const Body& body) {
+  switch (op) {
+    case Unary::negate:
+      return body(NegateOp());
+    case Unary::absolute:
+      return body(AbsoluteOp());
+    case Unary::square:
+      return body(SquareOp());
+    case Unary::squareRoot:
+      return body(SquareRootOp());
+    case Unary::exponential:
+      return body(ExponentialOp());
+    case Unary::logarithm:
+      return body(LogarithmOp());
+    case Unary::sine:
+      return body(SineOp());
+    case Unary::cosine:
+      return body(CosineOp());
+    case Unary::floor:
+      return body(FloorOp());
+    case Unary::mask:
+      return body(MaskOp());
+    case Unary::clamp:
+      return body(ClampOp(p));
+    case Unary::smoothstep:
+      return body(SmoothstepOp(p));
+    case Unary::tangent:
+    case Unary::arcSine:
+    case Unary::arcCosine:
+    case Unary::arcTangent:
+      return;
+  }
+}
+
+template <class Body>
+void withBinary(Binary op, Parameters p, const Body& body) {
+  switch (op) {
+    case Binary::add:
+      return body(AddOp());
+    case Binary::subtract:
+      return body(SubtractOp());
+    case Binary::multiply:
+      return body(MultiplyOp());
+    case Binary::divide:
+      return body(DivideOp());
+    case Binary::minimum:
+      return body(MinimumOp());
+    case Binary::maximum:
+      return body(MaximumOp());
+    case Binary::blend:
+      return body(BlendOp(p));
+    case Binary::power:
+    case Binary::arcTangent2:
+      return;
+  }
+}
+
+void unaryLanes(Unary op, Parameters p, const float* a, float* out, int count) {
+  withUnary(op, p, [=](const auto& o) HWY_ATTR { unaryLoop(o, a, out, count); });
+}
+void unaryGradLanes(Unary op, Parameters p, const float* a, float* out, float* const g[3], int count) {
+  withUnary(op, p, [=](const auto& o) HWY_ATTR { unaryGradLoop(o, a, out, g, count); });
+}
+void binaryLanes(Binary op, Parameters p, const float* a, const float* b, float* out, int count) {
+  withBinary(op, p, [=](const auto& o) HWY_ATTR { binaryLoop(o, a, b, out, count); });
+}
+void binaryGradLanes(Binary op, Parameters p, const float* a, const float* b, float* out, float* const ga[3],
+                     const float* const gb[3], int count) {
+  withBinary(op, p, [=](const auto& o) HWY_ATTR { binaryGradLoop(o, a, b, out, ga, gb, count); });
+}
+
+void productLanes(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
+  const D d;
+  const V s = constant(sign);
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V p = hn::Mul(hn::Mul(hn::Load(d, a + i), s), hn::Load(d, b + i));
+    hn::Store(accumulate ? hn::Add(hn::Load(d, out + i), p) : p, d, out + i);
+  }
+}
+
+void length3Lanes(const float* const v[3], float* out, int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V x = hn::Load(d, v[0] + i), y = hn::Load(d, v[1] + i), z = hn::Load(d, v[2] + i);
+    hn::Store(hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), d, out + i);
+  }
+}
+
+void normalize3Lanes(const float* const v[3], const float* length, float* const out[3], int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V l = hn::Load(d, length + i);
+    const auto zero = hn::Eq(l, hn::Zero(d));
+    for (int k = 0; k < 3; ++k)
+      hn::Store(hn::IfThenZeroElse(zero, hn::Div(hn::Load(d, v[k] + i), l)), d, out[k] + i);
+  }
+}
+
+void affine3Lanes(const float m[9], const float t[3], const float* const v[3], float* const out[3],
+                  int count) {
+  const D d;
+  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
+    const V x = hn::Load(d, v[0] + i), y = hn::Load(d, v[1] + i), z = hn::Load(d, v[2] + i);
+    for (int r = 0; r < 3; ++r) {
+      const V xy = hn::Add(hn::Mul(constant(m[3 * r]), x), hn::Mul(constant(m[3 * r + 1]), y));
+      hn::Store(hn::Add(hn::Add(xy, hn::Mul(constant(m[3 * r + 2]), z)), constant(t[r])), d, out[r] + i);
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephele::detail
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephele::detail {
+namespace {
+
+HWY_EXPORT(unaryLanes);
+HWY_EXPORT(unaryGradLanes);
+HWY_EXPORT(binaryLanes);
+HWY_EXPORT(binaryGradLanes);
+HWY_EXPORT(productLanes);
+HWY_EXPORT(length3Lanes);
+HWY_EXPORT(normalize3Lanes);
+HWY_EXPORT(affine3Lanes);
+
+bool isPlainLoop(Unary op) {
+  return op >= Unary::tangent && op <= Unary::arcTangent;
+}
+bool isPlainLoop(Binary op) {
+  return op == Binary::power || op == Binary::arcTangent2;
+}
+
+/// Derivative of the operations that are plain loops; `v` is their value.
+float derivative(Unary op, float a, float v) {
+  switch (op) {
+    case Unary::tangent:
+      return 1 + v * v;
+    case Unary::arcSine:
+      return 1 / std::sqrt(1 - a * a);
+    case Unary::arcCosine:
+      return -1 / std::sqrt(1 - a * a);
+    default:
+      return 1 / (1 + a * a);
+  }
+}
+
+}  // namespace
+
+float scalarValue(Unary op, Parameters parameters, float a) {
+  const auto [p, q] = parameters;
+  switch (op) {
+    case Unary::negate:
+      return -a;
+    case Unary::absolute:
+      return std::fabs(a);
+    case Unary::square:
+      return a * a;
+    case Unary::squareRoot:
+      return std::sqrt(a);
+    case Unary::exponential:
+      return std::exp(a);
+    case Unary::logarithm:
+      return std::log(a);
+    case Unary::sine:
+      return std::sin(a);
+    case Unary::cosine:
+      return std::cos(a);
+    case Unary::tangent:
+      return std::tan(a);
+    case Unary::arcSine:
+      return std::asin(a);
+    case Unary::arcCosine:
+      return std::acos(a);
+    case Unary::arcTangent:
+      return std::atan(a);
+    case Unary::floor:
+      return std::floor(a);
+    case Unary::mask:
+      return a > 0 ? 1.0f : 0.0f;
+    case Unary::clamp: {
+      const float m = a > p ? a : p;
+      return m < q ? m : q;
+    }
+    case Unary::smoothstep: {
+      float t = (a - p) * (1 / (q - p));
+      t = t > 0 ? t : 0;
+      t = t < 1 ? t : 1;
+      return t * t * (3 - (t + t));
+    }
+  }
+  return std::nanf("");
+}
+
+float scalarValue(Binary op, Parameters parameters, float a, float b) {
+  switch (op) {
+    case Binary::add:
+      return a + b;
+    case Binary::subtract:
+      return a - b;
+    case Binary::multiply:
+      return a * b;
+    case Binary::divide:
+      return a / b;
+    case Binary::minimum:
+      return a < b || b != b ? a : b;
+    case Binary::maximum:
+      return a > b || b != b ? a : b;
+    case Binary::power:
+      return std::pow(a, b);
+    case Binary::arcTangent2:
+      return std::atan2(a, b);
+    case Binary::blend: {
+      const float overlap = parameters.p - std::fabs(a - b);
+      const float inside = overlap > 0 ? overlap : 0;
+      return scalarValue(Binary::maximum, {}, a, b) + inside * inside * (0.25f / parameters.p);
+    }
+  }
+  return std::nanf("");
+}
+
+void apply(Unary op, Parameters parameters, const float* a, float* out, int count) {
+  if (!isPlainLoop(op)) {
+    HWY_DYNAMIC_DISPATCH(unaryLanes)(op, parameters, a, out, count);
+    return;
+  }
+  for (int i = 0; i < count; ++i) out[i] = scalarValue(op, parameters, a[i]);
+}
+
+void applyGrad(Unary op, Parameters parameters, const float* a, float* out, float* const g[3], int count) {
+  if (!isPlainLoop(op)) {
+    HWY_DYNAMIC_DISPATCH(unaryGradLanes)(op, parameters, a, out, g, count);
+    return;
+  }
+  for (int i = 0; i < count; ++i) {
+    const float v = scalarValue(op, parameters, a[i]);
+    const float slope = derivative(op, a[i], v);
+    for (int k = 0; k < 3; ++k) g[k][i] *= slope;
+    out[i] = v;
+  }
+}
+
+void apply(Binary op, Parameters parameters, const float* a, const float* b, float* out, int count) {
+  if (!isPlainLoop(op)) {
+    HWY_DYNAMIC_DISPATCH(binaryLanes)(op, parameters, a, b, out, count);
+    return;
+  }
+  for (int i = 0; i < count; ++i) out[i] = scalarValue(op, parameters, a[i], b[i]);
+}
+
+void applyGrad(Binary op, Parameters parameters, const float* a, const float* b, float* out,
+               float* const ga[3], const float* const gb[3], int count) {
+  if (!isPlainLoop(op)) {
+    HWY_DYNAMIC_DISPATCH(binaryGradLanes)(op, parameters, a, b, out, ga, gb, count);
+    return;
+  }
+  for (int i = 0; i < count; ++i) {
+    const float x = a[i], y = b[i];
+    float da, db;
+    if (op == Binary::power) {
+      da = y == 0 ? 0 : y * std::pow(x, y - 1);
+      // Where x <= 0 only whole constant exponents make sense, and those do not vary.
+      db = x > 0 ? std::pow(x, y) * std::log(x) : 0;
+    } else {
+      const float s = x * x + y * y;
+      da = y / s;
+      db = -x / s;
+    }
+    for (int k = 0; k < 3; ++k) ga[k][i] = da * ga[k][i] + db * gb[k][i];
+    out[i] = scalarValue(op, parameters, x, y);
+  }
+}
+
+void product(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
+  HWY_DYNAMIC_DISPATCH(productLanes)(a, b, sign, accumulate, out, count);
+}
+void length3(const float* const v[3], float* out, int count) {
+  HWY_DYNAMIC_DISPATCH(length3Lanes)(v, out, count);
+}
+void normalize3(const float* const v[3], const float* length, float* const out[3], int count) {
+  HWY_DYNAMIC_DISPATCH(normalize3Lanes)(v, length, out, count);
+}
+void affine3(const float m[9], const float t[3], const float* const v[3], float* const out[3], int count) {
+  HWY_DYNAMIC_DISPATCH(affine3Lanes)(m, t, v, out, count);
+}
+
+}  // namespace nephele::detail
+#endif  // HWY_ONCE

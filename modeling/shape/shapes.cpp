@@ -1,0 +1,469 @@
+// Solid shapes as fields. Each is a struct with its formula for one point; the loops over lanes are compiled
+// from it once for each instruction set, of which Highway chooses one when the program runs.
+//
+// Ranges: a distance changes by at most the way travelled, so the value in the middle of a box plus or minus
+// half its diagonal bounds it. Sphere, box and plane have tighter closed forms. All are widened by the
+// rounding of coordinates.
+#include "nephele/modeling/shape/shapes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <variant>
+
+#include "nephele/modeling/base/error.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "modeling/shape/shapes.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, as it decides what it defines.
+#include <hwy/highway.h>
+
+#ifndef NEPHELE_SHAPE_KINDS
+#define NEPHELE_SHAPE_KINDS
+// The shapes of shapes.h at one point: plain code that is the truth, and that compilers turn into lane code.
+//
+// at<true> also writes the gradient. Everything is selection instead of branches, so that loops over points
+// become vector code; nothing is fused, so that all instruction sets give the same bits.
+namespace nephele::detail {
+namespace {
+
+HWY_INLINE float larger(float a, float b) {
+  return a > b ? a : b;
+}
+HWY_INLINE float smaller(float a, float b) {
+  return a < b ? a : b;
+}
+HWY_INLINE float magnitude(float a) {
+  return a < 0 ? -a : a;
+}
+HWY_INLINE float root(float x, float y, float z) {
+  return std::sqrt(x * x + y * y + z * z);
+}
+/// 1 / v, or 0 for 0.
+HWY_INLINE float inverseOrZero(float v) {
+  return v > 0 ? 1 / v : 0.0f;
+}
+
+struct SphereShape {
+  Vec3f center;
+  float radius;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float x = px - center.x, y = py - center.y, z = pz - center.z;
+    const float d = root(x, y, z);
+    if constexpr (kGrad) {
+      const float s = -inverseOrZero(d);
+      gx = s * x, gy = s * y, gz = s * z;
+    }
+    return radius - d;
+  }
+};
+
+struct BoxShape {
+  Vec3f center, half;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float x = px - center.x, y = py - center.y, z = pz - center.z;
+    const float qx = magnitude(x) - half.x, qy = magnitude(y) - half.y, qz = magnitude(z) - half.z;
+    const float ox = larger(qx, 0), oy = larger(qy, 0), oz = larger(qz, 0);
+    const float outside = root(ox, oy, oz);
+    const float nearest = larger(larger(qx, qy), qz);
+    const float inside = smaller(nearest, 0);
+    if constexpr (kGrad) {
+      // Outside along the way to the nearest point; inside along the axis of the nearest face.
+      const float s = inverseOrZero(outside);
+      const bool isX = qx == nearest, isY = !isX && qy == nearest, isZ = !isX && !isY;
+      const bool out = outside > 0;
+      const float mx = out ? s * ox : (isX ? 1.0f : 0.0f);
+      const float my = out ? s * oy : (isY ? 1.0f : 0.0f);
+      const float mz = out ? s * oz : (isZ ? 1.0f : 0.0f);
+      gx = x < 0 ? mx : -mx, gy = y < 0 ? my : -my, gz = z < 0 ? mz : -mz;
+    }
+    return -(outside + inside);
+  }
+};
+
+struct PlaneShape {
+  Vec3f normal;
+  float offset;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    if constexpr (kGrad) gx = normal.x, gy = normal.y, gz = normal.z;
+    return normal.x * px + normal.y * py + normal.z * pz - offset;
+  }
+};
+
+struct TorusShape {
+  Vec3f center, axis;
+  float major, minor;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float x = px - center.x, y = py - center.y, z = pz - center.z;
+    const float h = x * axis.x + y * axis.y + z * axis.z;
+    const float rx = x - h * axis.x, ry = y - h * axis.y, rz = z - h * axis.z;
+    const float r = root(rx, ry, rz);
+    const float e = r - major;
+    const float d = std::sqrt(e * e + h * h);
+    if constexpr (kGrad) {
+      const float s = -inverseOrZero(d);
+      const float radial = s * e * inverseOrZero(r), along = s * h;
+      gx = radial * rx + along * axis.x, gy = radial * ry + along * axis.y, gz = radial * rz + along * axis.z;
+    }
+    return minor - d;
+  }
+};
+
+struct CapsuleShape {
+  Vec3f a, way;
+  /// 1 / |way|^2, or 0.
+  float inverseSquare;
+  float radius;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float x = px - a.x, y = py - a.y, z = pz - a.z;
+    const float t = smaller(larger((x * way.x + y * way.y + z * way.z) * inverseSquare, 0), 1);
+    const float wx = x - t * way.x, wy = y - t * way.y, wz = z - t * way.z;
+    const float d = root(wx, wy, wz);
+    if constexpr (kGrad) {
+      const float s = -inverseOrZero(d);
+      gx = s * wx, gy = s * wy, gz = s * wz;
+    }
+    return radius - d;
+  }
+};
+
+struct ConeShape {
+  Vec3f base, axis;
+  float radius, height;
+  /// 1 / (radius^2 + height^2), and the slant's inward normal in (distance from the axis, height).
+  float inverseSquare, normalR, normalH;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float x = px - base.x, y = py - base.y, z = pz - base.z;
+    const float h = x * axis.x + y * axis.y + z * axis.z;
+    const float rx = x - h * axis.x, ry = y - h * axis.y, rz = z - h * axis.z;
+    const float r = root(rx, ry, rz);
+    // Nearest points of the base and of the slant, as the way from there to (r, h).
+    const float br = larger(r - radius, 0), bh = h;
+    const float t = smaller(larger((h * height - (r - radius) * radius) * inverseSquare, 0), 1);
+    const float sr = r - radius + t * radius, sh = h - t * height;
+    const float bb = br * br + bh * bh, ss = sr * sr + sh * sh;
+    const bool onBase = bb < ss;
+    const float d = std::sqrt(onBase ? bb : ss);
+    const bool inside = h > 0 && (r - radius) * normalR + h * normalH > 0;
+    if constexpr (kGrad) {
+      const float s = inside ? inverseOrZero(d) : -inverseOrZero(d);
+      const float gr = d > 0 ? s * (onBase ? br : sr) : (onBase ? 0.0f : normalR);
+      const float gh = d > 0 ? s * (onBase ? bh : sh) : (onBase ? 1.0f : normalH);
+      const float radial = gr * inverseOrZero(r);
+      gx = radial * rx + gh * axis.x, gy = radial * ry + gh * axis.y, gz = radial * rz + gh * axis.z;
+    }
+    return inside ? d : -d;
+  }
+};
+
+struct EllipsoidShape {
+  Vec3f center, inverseRadii;
+  float smallest, largest;
+
+  template <bool kGrad>
+  HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
+    const float ux = (px - center.x) * inverseRadii.x, uy = (py - center.y) * inverseRadii.y,
+                uz = (pz - center.z) * inverseRadii.z;
+    const float vx = ux * inverseRadii.x, vy = uy * inverseRadii.y, vz = uz * inverseRadii.z;
+    const float k = root(ux, uy, uz), m = root(vx, vy, vz);
+    // k / m lies between the radii; rounding and the centre, where it has no limit, must not leave them.
+    const float ratio = smaller(larger(k * inverseOrZero(m), smallest), largest);
+    if constexpr (kGrad) {
+      const float ik = inverseOrZero(k), im = inverseOrZero(m);
+      const float a = (1 - 2 * k) * im * ik, b = (1 - k) * ratio * im * im;
+      gx = a * vx - b * vx * inverseRadii.x * inverseRadii.x;
+      gy = a * vy - b * vy * inverseRadii.y * inverseRadii.y;
+      gz = a * vz - b * vz * inverseRadii.z * inverseRadii.z;
+    }
+    return (1 - k) * ratio;
+  }
+};
+
+using ShapeKind =
+    std::variant<SphereShape, BoxShape, PlaneShape, TorusShape, CapsuleShape, ConeShape, EllipsoidShape>;
+
+}  // namespace
+}  // namespace nephele::detail
+#endif  // NEPHELE_SHAPE_KINDS
+
+HWY_BEFORE_NAMESPACE();
+namespace nephele::detail {
+namespace HWY_NAMESPACE {
+
+template <class Shape>
+void valueLoop(const Shape shape, const float* __restrict x, const float* __restrict y,
+               const float* __restrict z, float* __restrict values, int count) {
+  for (int i = 0; i < count; ++i) {
+    float unused[3];
+    values[i] = shape.template at<false>(x[i], y[i], z[i], unused[0], unused[1], unused[2]);
+  }
+}
+
+template <class Shape>
+void gradLoop(const Shape shape, const float* __restrict x, const float* __restrict y,
+              const float* __restrict z, float* __restrict values, float* __restrict gx, float* __restrict gy,
+              float* __restrict gz, int count) {
+  for (int i = 0; i < count; ++i) values[i] = shape.template at<true>(x[i], y[i], z[i], gx[i], gy[i], gz[i]);
+}
+
+void shapeLanes(const ShapeKind& kind, const PointBlock& p, float* values) {
+  std::visit([&](const auto& shape) HWY_ATTR { valueLoop(shape, p.x, p.y, p.z, values, p.paddedCount()); },
+             kind);
+}
+
+void shapeGradLanes(const ShapeKind& kind, const PointBlock& p, float* values, const BlockLanes<3>& g) {
+  std::visit([&](const auto& shape)
+                 HWY_ATTR { gradLoop(shape, p.x, p.y, p.z, values, g[0], g[1], g[2], p.paddedCount()); },
+             kind);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace nephele::detail
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nephele {
+namespace detail {
+namespace {
+
+HWY_EXPORT(shapeLanes);
+HWY_EXPORT(shapeGradLanes);
+
+/// Rounding error of a distance computed from coordinates up to `reach`, with room to spare.
+float rounding(float reach) {
+  return 2e-6f * reach;
+}
+
+float reachOf(const Box& box) {
+  return std::max({std::abs(box.min.x), std::abs(box.min.y), std::abs(box.min.z), std::abs(box.max.x),
+                   std::abs(box.max.y), std::abs(box.max.z)});
+}
+
+template <class Shape>
+float valueAt(const Shape& shape, const Vec3f& p) {
+  float unused[3];
+  return shape.template at<false>(p.x, p.y, p.z, unused[0], unused[1], unused[2]);
+}
+
+/// Range of a distance field over a bounded box from its value in the middle.
+template <class Shape>
+Interval distanceRange(const Shape& shape, const Box& box, float largest) {
+  const Vec3f c = box.center();
+  const float v = valueAt(shape, c), radius = 0.5f * length(box.size());
+  return {v - radius, std::min(v + radius, largest)};
+}
+
+/// Least and largest |x - center| per axis.
+std::array<Interval, 3> awayFrom(const Vec3f& center, const Box& box) {
+  const auto x = rangeOf(box);
+  return {abs(x[0] - Interval::of(center.x)), abs(x[1] - Interval::of(center.y)),
+          abs(x[2] - Interval::of(center.z))};
+}
+
+Interval norm(const std::array<Interval, 3>& v) {
+  return sqrt(square(v[0]) + square(v[1]) + square(v[2]));
+}
+
+Interval rangeIn(const SphereShape& s, const Box& box) {
+  return Interval::of(s.radius) - norm(awayFrom(s.center, box));
+}
+Interval rangeIn(const BoxShape& s, const Box& box) {
+  auto q = awayFrom(s.center, box);
+  for (int k = 0; k < 3; ++k) q[k] = q[k] - Interval::of(s.half[k]);
+  const Interval zero = Interval::of(0.0f);
+  const Interval outside = norm({max(q[0], zero), max(q[1], zero), max(q[2], zero)});
+  return -(outside + min(max(max(q[0], q[1]), q[2]), zero));
+}
+Interval rangeIn(const PlaneShape& s, const Box& box) {
+  const auto x = rangeOf(box);
+  Interval sum = Interval::of(-s.offset);
+  for (int k = 0; k < 3; ++k)
+    if (s.normal[k] != 0) sum = sum + Interval::of(s.normal[k]) * x[k];
+  return sum;
+}
+Interval rangeIn(const TorusShape& s, const Box& box) {
+  return distanceRange(s, box, s.minor);
+}
+Interval rangeIn(const CapsuleShape& s, const Box& box) {
+  return distanceRange(s, box, s.radius);
+}
+Interval rangeIn(const ConeShape& s, const Box& box) {
+  return distanceRange(s, box, std::min(s.radius, s.height));
+}
+Interval rangeIn(const EllipsoidShape& s, const Box& box) {
+  auto u = awayFrom(s.center, box);
+  for (int k = 0; k < 3; ++k) u[k] = u[k] * Interval::of(s.inverseRadii[k]);
+  return (Interval::of(1.0f) - norm(u)) * Interval{s.smallest, s.largest};
+}
+
+/// Largest value, and a size that bounds the coordinates of the shape.
+struct Extent {
+  float largest, reach;
+};
+
+float reachOf(const Vec3f& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+Extent extentOf(const SphereShape& s) {
+  return {s.radius, reachOf(s.center) + s.radius};
+}
+Extent extentOf(const BoxShape& s) {
+  return {std::min({s.half.x, s.half.y, s.half.z}), reachOf(s.center) + reachOf(s.half)};
+}
+Extent extentOf(const PlaneShape& s) {
+  return {std::numeric_limits<float>::infinity(), std::abs(s.offset)};
+}
+Extent extentOf(const TorusShape& s) {
+  return {s.minor, reachOf(s.center) + s.major + s.minor};
+}
+Extent extentOf(const CapsuleShape& s) {
+  return {s.radius, reachOf(s.a) + length(s.way) + s.radius};
+}
+Extent extentOf(const ConeShape& s) {
+  return {std::min(s.radius, s.height), reachOf(s.base) + s.radius + s.height};
+}
+Extent extentOf(const EllipsoidShape& s) {
+  // Rounding of points is multiplied by largest / smallest on its way through k and k / m.
+  return {s.largest, (reachOf(s.center) + s.largest) * (s.largest / s.smallest)};
+}
+
+class ShapeNode final : public FieldNode<float> {
+ public:
+  ShapeNode(ShapeKind kind, float size) : kind_(std::move(kind)), size_(size) {}
+
+  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch&) const override {
+    HWY_DYNAMIC_DISPATCH(shapeLanes)(kind_, points, values[0]);
+  }
+  void evalGrad(const PointBlock& points, const BlockLanes<1>& values, const BlockLanes<3>& grads,
+                Scratch&) const override {
+    HWY_DYNAMIC_DISPATCH(shapeGradLanes)(kind_, points, values[0], grads);
+  }
+  Interval range(const Box& box) const override {
+    return std::visit(
+        [&](const auto& shape) -> Interval {
+          const Extent extent = extentOf(shape);
+          const float reach = reachOf(box);
+          // Squares of what lies further away overflow.
+          if (!(reach < 1e18f) || box.isEmpty())
+            return {-std::numeric_limits<float>::infinity(), extent.largest};
+          const bool isEllipsoid = std::is_same_v<std::decay_t<decltype(shape)>, EllipsoidShape>;
+          const float stretch = isEllipsoid ? extent.reach / size_ : 1.0f;
+          const float slack = rounding(extent.reach + reach * std::max(stretch, 1.0f));
+          const Interval r = rangeIn(shape, box);
+          return {r.min - slack, r.max + slack};
+        },
+        kind_);
+  }
+  float differenceStep() const override { return size_ > 0 ? kDefaultStep * size_ : kNoLength; }
+
+ private:
+  ShapeKind kind_;
+  /// A length that is typical of the shape; 0 for a plane, which has none.
+  float size_;
+};
+
+ScalarField shapeField(ShapeKind kind, float size) {
+  return ScalarField(std::make_shared<ShapeNode>(std::move(kind), size));
+}
+
+void requireSize(float value, const char* shape, const char* name) {
+  require(value > 0 && value < 1e18f,
+          std::string(shape) + ": " + name + " must be > 0 and finite, got " + std::to_string(value));
+}
+
+void requirePoint(const Vec3f& p, const char* shape, const char* name) {
+  require(isFinite(p) && reachOf(p) < 1e18f, std::string(shape) + ": " + name + " must be finite");
+}
+
+/// `v` with length 1, computed in double. @throws Error naming the argument if it has no direction.
+Vec3f direction(const Vec3f& v, const char* shape, const char* name) {
+  const Vec3d d(v);
+  const double l = length(d);
+  require(std::isfinite(l) && l > 0, std::string(shape) + ": " + name + " must be finite and not zero");
+  return Vec3f(d / l);
+}
+
+}  // namespace
+}  // namespace detail
+
+using detail::direction;
+using detail::requirePoint;
+using detail::requireSize;
+using detail::shapeField;
+
+ScalarField sphere(const Vec3f& center, float radius) {
+  requirePoint(center, "sphere", "center");
+  requireSize(radius, "sphere", "radius");
+  return shapeField(detail::SphereShape{center, radius}, radius);
+}
+
+ScalarField box(const Box& box) {
+  requirePoint(box.min, "box", "min");
+  requirePoint(box.max, "box", "max");
+  require(box.min.x < box.max.x && box.min.y < box.max.y && box.min.z < box.max.z,
+          "box: min must be below max on every axis");
+  const Vec3f half = box.size() * 0.5f;
+  return shapeField(detail::BoxShape{box.center(), half}, std::min({half.x, half.y, half.z}));
+}
+
+ScalarField plane(const Vec3f& point, const Vec3f& normal) {
+  requirePoint(point, "plane", "point");
+  const Vec3f n = direction(normal, "plane", "normal");
+  return shapeField(detail::PlaneShape{n, float(dot(Vec3d(n), Vec3d(point)))}, 0);
+}
+
+ScalarField torus(const TorusOptions& options) {
+  requirePoint(options.center, "torus", "center");
+  requireSize(options.majorRadius, "torus", "majorRadius");
+  requireSize(options.minorRadius, "torus", "minorRadius");
+  const Vec3f axis = direction(options.axis, "torus", "axis");
+  return shapeField(detail::TorusShape{options.center, axis, options.majorRadius, options.minorRadius},
+                    options.minorRadius);
+}
+
+ScalarField cone(const ConeOptions& options) {
+  requirePoint(options.apex, "cone", "apex");
+  requirePoint(options.baseCenter, "cone", "baseCenter");
+  requireSize(options.baseRadius, "cone", "baseRadius");
+  const Vec3f way = options.apex - options.baseCenter;
+  const Vec3f axis = direction(way, "cone", "apex - baseCenter");
+  const float height = length(way), r = options.baseRadius, slant = std::hypot(r, height);
+  return shapeField(detail::ConeShape{options.baseCenter, axis, r, height, 1 / (slant * slant),
+                                      -height / slant, -r / slant},
+                    std::min(r, height));
+}
+
+ScalarField capsule(const Vec3f& a, const Vec3f& b, float radius) {
+  requirePoint(a, "capsule", "a");
+  requirePoint(b, "capsule", "b");
+  requireSize(radius, "capsule", "radius");
+  const Vec3f way = b - a;
+  const float square = dot(way, way);
+  return shapeField(detail::CapsuleShape{a, way, square > 0 ? 1 / square : 0.0f, radius}, radius);
+}
+
+ScalarField ellipsoid(const Vec3f& center, const Vec3f& radii) {
+  requirePoint(center, "ellipsoid", "center");
+  for (int k = 0; k < 3; ++k) requireSize(radii[k], "ellipsoid", "radii");
+  const float smallest = std::min({radii.x, radii.y, radii.z}),
+              largest = std::max({radii.x, radii.y, radii.z});
+  return shapeField(
+      detail::EllipsoidShape{center, {1 / radii.x, 1 / radii.y, 1 / radii.z}, smallest, largest}, smallest);
+}
+
+}  // namespace nephele
+#endif  // HWY_ONCE

@@ -1,0 +1,93 @@
+#include "nephele/render/image/contact_sheet.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+namespace {
+
+// The columns that make a sheet of `count` cells of `aspect` (width / height) most like 16:9, empty places
+// counted against it.
+int bestColumns(int count, double aspect) {
+  int best = 1;
+  double bestCost = HUGE_VAL;
+  for (int columns = 1; columns <= count; ++columns) {
+    const int rows = (count + columns - 1) / columns;
+    const double shape = std::fabs(std::log(columns * aspect / rows * 9 / 16));
+    const double cost = shape + 2.0 * (columns * rows - count) / (columns * rows);
+    if (cost < bestCost) {
+      bestCost = cost;
+      best = columns;
+    }
+  }
+  return best;
+}
+
+// What output pixel `i` of `to` covers of `from` pixels.
+struct Cover {
+  int begin, end;
+  double start, stop;
+
+  Cover(int i, int from, int to) : start(double(i) * from / to), stop((i + 1.0) * from / to) {
+    begin = int(start);
+    end = std::min(from, int(std::ceil(stop)));
+  }
+  double share(int pixel) const {
+    return (std::min(stop, pixel + 1.0) - std::max(start, double(pixel))) / (stop - start);
+  }
+};
+
+constexpr const char* kNames[] = {"R", "G", "B", "A"};
+
+}  // namespace
+
+ContactSheet::ContactSheet(int frameCount, int frameWidth, int frameHeight,
+                           const ContactSheetOptions& options)
+    : frameWidth_(frameWidth), frameHeight_(frameHeight), gap_(options.gap) {
+  require(
+      frameCount >= 1 && frameWidth >= 1 && frameHeight >= 1,
+      fmt::format("contact sheet: expected frames, got {} of {}x{}", frameCount, frameWidth, frameHeight));
+  require(options.width >= 1 && options.gap >= 0 && options.mostFrames >= 1,
+          "contact sheet: expected a width and a number of frames of at least 1, and a gap of at least 0");
+  const int count = std::min(frameCount, options.mostFrames);
+  for (int i = 0; i != count; ++i) shown_.push_back(int((long long)(i)*frameCount / count));
+
+  const double aspect = double(frameWidth) / frameHeight;
+  columns_ = bestColumns(count, aspect);
+  cellWidth_ = std::clamp((options.width - gap_ * (columns_ + 1)) / columns_, 1, frameWidth);
+  cellHeight_ = std::max(1, int(std::lround(cellWidth_ / aspect)));
+  image_.width = columns_ * cellWidth_ + gap_ * (columns_ + 1);
+  image_.height = rows() * cellHeight_ + gap_ * (rows() + 1);
+  for (const char* name : kNames) image_.add(name);
+  std::ranges::fill(image_.channels[3].values, 1.0f);
+}
+
+void ContactSheet::set(int place, const Image& frame) {
+  require(place >= 0 && place < int(shown_.size()),
+          fmt::format("contact sheet: expected a place below {}, got {}", shown_.size(), place));
+  require(frame.width == frameWidth_ && frame.height == frameHeight_,
+          fmt::format("contact sheet: expected a frame of {}x{}, got {}x{}", frameWidth_, frameHeight_,
+                      frame.width, frame.height));
+  const int left = gap_ + place % columns_ * (cellWidth_ + gap_),
+            top = gap_ + place / columns_ * (cellHeight_ + gap_);
+  for (std::size_t c = 0; c != std::size(kNames); ++c) {
+    const std::vector<float>& from = frame.channel(kNames[c]).values;
+    for (int y = 0; y != cellHeight_; ++y) {
+      const Cover rows(y, frameHeight_, cellHeight_);
+      for (int x = 0; x != cellWidth_; ++x) {
+        const Cover columns(x, frameWidth_, cellWidth_);
+        double sum = 0;
+        for (int v = rows.begin; v != rows.end; ++v)
+          for (int u = columns.begin; u != columns.end; ++u)
+            sum += rows.share(v) * columns.share(u) * double(from[std::size_t(v) * frameWidth_ + u]);
+        image_.channels[c].values[std::size_t(top + y) * image_.width + left + x] = float(sum);
+      }
+    }
+  }
+}
+
+}  // namespace nephele

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Imath/ImathBox.h>
+#include <OpenEXR/ImfHeader.h>
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "nephele/render/image/image.h"
+#include "nephele/render/scene/camera.h"
+
+namespace nephele::detail {
+
+/// Pixels of an image in the picture that it is a part of.
+Imath::Box2i dataWindow(int width, int height, const std::optional<Image::Display>& display);
+
+/// The header that all of our OpenEXR files have in common: windows, camera, colours, metadata.
+Imf::Header exrHeader(int width, int height, const std::optional<Image::Display>& display,
+                      const Camera& camera, const std::map<std::string, std::string>& metadata);
+
+}  // namespace nephele::detail

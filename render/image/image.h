@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nephele/modeling/base/math.h"
+#include "nephele/render/scene/camera.h"
+
+namespace nephele {
+
+/// A picture as named channels of floats, rows from the top.
+///
+/// R, G, B are linear light premultiplied by the opacity A; layers are named as in EXR files: "light_sun.R".
+struct Image {
+  struct Channel {
+    std::string name;
+    /// Stored as 16 bit in files.
+    bool half = true;
+    std::vector<float> values;
+  };
+
+  /// Where the pixels lie in a larger picture, the display window of EXR files.
+  struct Display {
+    /// Of the upper left pixel in it.
+    int x = 0, y = 0;
+    int width = 0, height = 0;
+    bool operator==(const Display&) const = default;
+  };
+
+  int width = 0, height = 0;
+  /// The whole picture, where this is only a part of it or more than it.
+  std::optional<Display> display{};
+  std::vector<Channel> channels;
+
+  /// Before channels are added: makes this the part `window` of a picture of displayWidth x displayHeight.
+  void setWindow(const PixelBox& window, int displayWidth, int displayHeight);
+
+  /// Appends a channel of zeros; the reference is valid until the next one is added.
+  Channel& add(const std::string& name, bool half = true);
+  /// The channel called `name`, or null.
+  const Channel* find(const std::string& name) const;
+  /// @throws Error naming the channel if it is not there.
+  const Channel& channel(const std::string& name) const;
+  float at(const std::string& name, int x, int y) const {
+    return channel(name).values[std::size_t(y) * width + x];
+  }
+};
+
+/// How linear light becomes a picture for the screen.
+///
+/// x = 2^exposureStops * (rgb + (1 - A) background), per channel then  x <= s: x;  x > s: s + (1 - s)(1 -
+/// exp(-(x - s) / (1 - s))), with s = shoulder, which never clips and has no kink, then the sRGB curve.
+struct ViewTransform {
+  float exposureStops = 0.0f;
+  float shoulder = 0.6f;
+  /// Linear radiance behind pictures that have no layer `backdrop`.
+  Vec3f background{};
+};
+
+/// Screen values in [0, 1], three per pixel, of R, G, B and A of `image`. @throws Error if one of them is
+/// missing.
+std::vector<float> displayed(const Image& image, const ViewTransform& view);
+
+/// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands
+/// still from frame to frame.
+std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view);
+
+}  // namespace nephele

@@ -1,0 +1,110 @@
+// Which reader a file needs, by its first bytes, and what is common to all formats.
+#include "nephele/render/image/image_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <set>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/exr_io.h"
+
+namespace nephele {
+
+namespace detail {
+
+void requireSize(const std::string& path, long long width, long long height, long long channels) {
+  constexpr long long most = 1 << 20;
+  if (width < 1 || height < 1 || channels < 1)
+    throw Error(fmt::format("{}: holds no pixels ({} x {}, {} channels)", path, width, height, channels));
+  if (width > most || height > most || channels > 4096)
+    throw Error(fmt::format("{}: is damaged: {} x {} pixels of {} channels", path, width, height, channels));
+}
+
+namespace {
+
+void readFile(const std::string& path, const ImageReader& reader) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<unsigned char, 12> start{};
+  if (!file.read(reinterpret_cast<char*>(start.data()), 4)) throw Error(path + ": cannot be read");
+  file.read(reinterpret_cast<char*>(start.data()) + 4, 8);
+  const auto startsWith = [&](const char* magic, std::size_t count) {
+    return std::memcmp(start.data(), magic, count) == 0;
+  };
+  if (startsWith("\x76\x2f\x31\x01", 4)) return readExrFile(path, reader);
+  if (startsWith("\x89PNG", 4)) return readPngFile(path, reader);
+  if (startsWith("#?RADIANCE", 10) || startsWith("#?RGBE", 6)) return readRadianceFile(path, reader);
+  throw Error(path + ": is not an image of a kind that is known (OpenEXR, PNG, Radiance)");
+}
+
+}  // namespace
+}  // namespace detail
+
+Image readImage(const std::string& path) {
+  Image image;
+  detail::readFile(path, {[&](const detail::ImageHeader& header) {
+                            image.width = header.width;
+                            image.height = header.height;
+                            if (header.display != Image::Display{0, 0, header.width, header.height})
+                              image.display = header.display;
+                            for (const auto& channel : header.channels)
+                              image.add(channel.name, channel.type != "float");
+                          },
+                          [&](int y, const float* values) {
+                            const std::size_t count = image.channels.size(),
+                                              first = std::size_t(y) * image.width;
+                            for (std::size_t x = 0; x != std::size_t(image.width); ++x)
+                              for (std::size_t c = 0; c != count; ++c)
+                                image.channels[c].values[first + x] = values[x * count + c];
+                          }});
+  return image;
+}
+
+std::vector<std::string> describeImage(const std::string& path) {
+  struct Range {
+    float low = INFINITY, high = -INFINITY;
+    std::size_t notFinite = 0;
+  };
+  detail::ImageHeader header;
+  std::vector<Range> ranges;
+  detail::readFile(path, {[&](const detail::ImageHeader& h) {
+                            header = h;
+                            ranges.resize(h.channels.size());
+                          },
+                          [&](int, const float* values) {
+                            for (int x = 0; x != header.width; ++x)
+                              for (Range& range : ranges) {
+                                const float value = *values++;
+                                if (std::isfinite(value)) {
+                                  range.low = std::min(range.low, value);
+                                  range.high = std::max(range.high, value);
+                                } else {
+                                  ++range.notFinite;
+                                }
+                              }
+                          }});
+  const std::size_t count = header.channels.size();
+  std::vector<std::string> lines{fmt::format("image {} x {}, {} channel{}, {}", header.width, header.height,
+                                             count, count == 1 ? "" : "s", header.format)};
+  std::set<std::string> layers;
+  for (std::size_t c = 0; c != count; ++c) {
+    const std::string& name = header.channels[c].name;
+    if (const std::size_t dot = name.rfind('.'); dot != std::string::npos) layers.insert(name.substr(0, dot));
+    const Range& range = ranges[c];
+    std::string line = "channel " + name + ": " + header.channels[c].type;
+    if (range.low <= range.high) line += fmt::format(", {:g} to {:g}", range.low, range.high);
+    if (range.notFinite > 0) line += fmt::format(", {} not finite", range.notFinite);
+    lines.push_back(std::move(line));
+  }
+  std::string names;
+  for (const std::string& layer : layers) names += (names.empty() ? "layers: " : ", ") + layer;
+  if (!names.empty()) lines.push_back(names);
+  for (const auto& [name, value] : header.attributes) lines.push_back(name + ": " + value);
+  return lines;
+}
+
+}  // namespace nephele

@@ -1,0 +1,133 @@
+// PNG files, through libpng.
+#include "nephele/render/image/png_io.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+
+#include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/image_file.h"
+
+namespace nephele {
+
+namespace {
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+// libpng reports errors through a callback that must not return; it is C++ all the way up here, so it throws.
+[[noreturn]] void fail(png_structp, png_const_charp message) {
+  throw Error(message);
+}
+void ignore(png_structp, png_const_charp) {}
+
+struct Writer {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore);
+  png_infop info = png_create_info_struct(png);
+  Writer() = default;
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+};
+
+struct Reader {
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore);
+  png_infop info = png_create_info_struct(png);
+  Reader() = default;
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+}  // namespace
+
+void writePng(const std::string& path, const Image& image, const ViewTransform& view,
+              const std::map<std::string, std::string>& metadata) {
+  const auto width = std::size_t(image.width);
+  const std::vector<std::uint8_t> bytes = screenBytes(image, view);
+  OutputFile output(path);
+  try {
+    const File file(std::fopen(output.temporaryPath().c_str(), "wb"));
+    require(file != nullptr, "the file cannot be opened");
+    const Writer writer;
+    png_init_io(writer.png, file.get());
+    png_set_IHDR(writer.png, writer.info, png_uint_32(image.width), png_uint_32(image.height), 8,
+                 PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
+    for (const auto& [name, value] : metadata) {
+      // libpng takes its texts by pointers that are not const, and copies them.
+      png_text text{};
+      text.compression = PNG_TEXT_COMPRESSION_NONE;
+      text.key = const_cast<char*>(name.c_str());
+      text.text = const_cast<char*>(value.c_str());
+      png_set_text(writer.png, writer.info, &text, 1);
+    }
+    png_write_info(writer.png, writer.info);
+    for (std::size_t y = 0; y != std::size_t(image.height); ++y)
+      png_write_row(writer.png, bytes.data() + y * width * 3);
+    png_write_end(writer.png, nullptr);
+    require(std::fflush(file.get()) == 0, "the disk is full");
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("{}: cannot be written: {}", path, error.what()));
+  }
+  output.commit();
+}
+
+void detail::readPngFile(const std::string& path, const ImageReader& reader) {
+  try {
+    const File file(std::fopen(path.c_str(), "rb"));
+    require(file != nullptr, "the file cannot be opened");
+    const Reader png;
+    png_init_io(png.png, file.get());
+    png_read_info(png.png, png.info);
+    const int depth = png_get_bit_depth(png.png, png.info);
+    ImageHeader header;
+    header.format = "PNG";
+    header.width = int(png_get_image_width(png.png, png.info));
+    header.height = int(png_get_image_height(png.png, png.info));
+    png_set_expand(png.png);
+    const bool interlaced = png_set_interlace_handling(png.png) > 1;
+    png_read_update_info(png.png, png.info);
+    const std::size_t count = png_get_channels(png.png, png.info);
+    requireSize(path, header.width, header.height, (long long)(count));
+    const char* names[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+    for (std::size_t c = 0; c != count; ++c)
+      header.channels.push_back({names[count - 1][c], depth == 16 ? "uint16" : "uint8"});
+    png_textp texts = nullptr;
+    const int textCount = png_get_text(png.png, png.info, &texts, nullptr);
+    for (int i = 0; i < textCount; ++i)
+      header.attributes.emplace_back(texts[i].key, texts[i].text ? texts[i].text : "");
+    reader.begin(header);
+
+    const std::size_t rowBytes = png_get_rowbytes(png.png, png.info);
+    // An interlaced file is whole only after its last pass.
+    std::vector<std::uint8_t> bytes(rowBytes * (interlaced ? std::size_t(header.height) : 1));
+    if (interlaced) {
+      std::vector<png_bytep> rows;
+      for (int y = 0; y != header.height; ++y) rows.push_back(bytes.data() + std::size_t(y) * rowBytes);
+      png_read_image(png.png, rows.data());
+    }
+    std::vector<float> values(std::size_t(header.width) * count);
+    for (int y = 0; y != header.height; ++y) {
+      if (!interlaced) png_read_row(png.png, bytes.data(), nullptr);
+      const std::uint8_t* from = bytes.data() + (interlaced ? std::size_t(y) * rowBytes : 0);
+      for (std::size_t i = 0; i != values.size(); ++i)
+        values[i] =
+            depth == 16 ? float(from[2 * i] * 256 + from[2 * i + 1]) / 65535.0f : float(from[i]) / 255.0f;
+      reader.row(y, values.data());
+    }
+    png_read_end(png.png, nullptr);
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+  }
+}
+
+}  // namespace nephele

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "nephele/render/image/image.h"
+
+namespace nephele {
+
+/// Writes `image` as an 8 bit sRGB picture, through `view`. Written beside `path` and renamed. `metadata`
+/// becomes text chunks.
+/// @throws Error naming the path; no partial file stays.
+void writePng(const std::string& path, const Image& image, const ViewTransform& view,
+              const std::map<std::string, std::string>& metadata = {});
+
+}  // namespace nephele

@@ -1,0 +1,292 @@
+// Light before the first ray: a column density volume for every sun and light at a place, and what all lights
+// scatter on a lattice.
+//
+// Limits: octaves are split by the mean albedo of the three colours.
+#include "nephele/render/light/baked_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/render/light/deep_shadow.h"
+#include "nephele/render/volume/finer_density.h"
+
+namespace nephele::detail {
+
+BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
+                       const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
+                       const Surfaces* surfaces)
+    : source(&volume),
+      medium(itsMedium),
+      lights(itsLights),
+      octaves(itsOctaves),
+      voxelSize(volume.density().voxelSize),
+      toDensity(volume.density().worldToIndex, volume.density().firstBrick) {
+  const BrickGrid& grid = volume.density();
+  scene.density = {grid.values.data(), grid.table.data(), grid.brickCount};
+  scene.ranges = grid.ranges.data();
+  scene.emptiness = volume.emptiness().data();
+  scene.uniformity = volume.uniformity().data();
+  // The scene's extinction is that of the most opaque colour.
+  const float most =
+      std::max({medium.extinctionColour.x, medium.extinctionColour.y, medium.extinctionColour.z});
+  scene.extinction = medium.extinction * most;
+  for (int c = 0; c != 3; ++c) scene.extinctionColour[c] = medium.extinctionColour[c] / most;
+  setColours(volume, most);
+  const bool grey = medium.albedo.x == medium.albedo.y && medium.albedo.x == medium.albedo.z;
+  takeLights();
+  scene.colours = grey && !scene.isColoured() && !lights.map ? 1 : 3;
+  const Vec3f corner(grid.firstBrick * BrickGrid::kBrick);
+  bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
+
+  const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
+  std::optional<RenderVolume> finer;
+  if (lights.shadowDetail > 1 && (!distant.empty() || !lights.locals.empty()))
+    finer.emplace(finerDensity(grid, lights.shadowDetail));
+  const RenderVolume& shading = finer ? *finer : volume;
+  suns.reserve(distant.size());
+  for (const DistantLight& sun : distant) {
+    progress.begin("light " + sun.name);
+    LightVolume& light = suns.emplace_back(shading, sun.direction, progress);
+    shadowDeeply(volume, sun, light, progress);
+    if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
+    scene.suns.push_back(
+        {{nullptr, light.table().data(), light.brickCount()}, {sun.shadow.x, sun.shadow.y, sun.shadow.z}});
+    toSun.emplace_back(light.worldToLattice(), light.firstBrick());
+    directions.push_back(normalize(Vec3d(sun.direction)));
+  }
+  locals.reserve(lights.locals.size());
+  for (const LocalLight& light : lights.locals) {
+    progress.begin("light " + light.name);
+    ProjectedLightVolume& shadows = locals.emplace_back(shading, light, progress);
+    shadowDeeply(volume, light, shadows, progress);
+    if (surfaces && surfaces->castsShadows()) shadows.addShade(toShade, columnPerDepth(light.shadow));
+  }
+  scatter(volume, before, progress);
+  for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
+  code();
+}
+
+// Last, when the floats have been read and what the light needed while it was made is given back.
+void BakedLight::code() {
+  scene.density.pairs = source->coded().pairs();
+  scene.density.entries = source->coded().entries();
+  for (std::size_t i = 0; i != suns.size(); ++i) {
+    suns[i].code();
+    scene.suns[i].pairs = suns[i].coded().pairs();
+    scene.suns[i].entries = suns[i].coded().entries();
+  }
+}
+
+// The column of an optical depth of 1 in the colour that a light's shadow is least opaque in; a light whose
+// shadow lets a colour through is not stopped by objects in it either.
+float BakedLight::columnPerDepth(const Vec3f& shadow) const {
+  float least = 1;
+  for (int c = 0; c != 3; ++c)
+    if (const float share = shadow[c] * scene.extinctionColour[c]; share > 0) least = std::min(least, share);
+  return 1 / (scene.extinction * std::max(least, 0.01f));
+}
+
+// Fills the columns of a light from its deep shadow map, if it has one.
+template <class Light, class Columns>
+void BakedLight::shadowDeeply(const RenderVolume& volume, const Light& light, Columns& columns,
+                              const Progress& progress) const {
+  std::shared_ptr<const DeepShadowMap> map = light.deepShadow;
+  if (!map && lights.deepTolerance)
+    map = std::make_shared<const DeepShadowMap>(volume, light, scene.extinction,
+                                                DeepShadowMap::Options{*lights.deepTolerance}, progress);
+  if (!map || !(scene.extinction > 0)) return;
+  columns.replace([&](const Vec3f& world) { return map->opticalDepth(world) / scene.extinction; });
+}
+
+// Lists the distant lights, those of the sky's map among them, and what becomes of every light's result.
+void BakedLight::takeLights() {
+  distant = lights.suns;
+  const std::size_t skyLayer = lights.suns.size() + lights.locals.size();
+  for (std::size_t i = 0; i != distant.size(); ++i) layers.push_back(i);
+  skyGain = lights.sky;
+  if (lights.map) {
+    Environment map = *lights.map;
+    for (DistantLight& spot : map.takeSpots(MarchScene::kMostSuns - int(Lights::kMost))) {
+      spot.name = "sky";
+      distant.push_back(spot);
+      layers.push_back(skyLayer);
+    }
+    sky = map;
+    skyGain = {1, 1, 1};
+  }
+  for (const DistantLight& sun : distant) gains.push_back(sun.irradiance);
+  for (std::size_t i = 0; i != lights.locals.size(); ++i) {
+    gains.push_back(lights.locals[i].intensity);
+    layers.push_back(lights.suns.size() + i);
+  }
+  layers.push_back(skyLayer);
+  const auto noteShadow = [&](const Vec3f& s) {
+    if (s.x != s.y || s.x != s.z) scene.hasColouredShadow = true;
+  };
+  for (const DistantLight& sun : distant) noteShadow(sun.shadow);
+  for (const LocalLight& light : lights.locals) noteShadow(light.shadow);
+}
+
+// After `scatter`, which makes the phase functions.
+void BakedLight::addLocal(const LocalLight& light, const ProjectedLightVolume& shadows) {
+  constexpr int nodes = MarchScene::Local::kPhaseNodes;
+  if (phaseTable.empty())
+    for (int n = 0; n != scene.octaves; ++n)
+      for (int i = 0; i <= nodes; ++i) {
+        const float sine = float(i) / float(nodes), cosine = 1 - 2 * sine * sine;
+        const float next = n + 1 < scene.octaves ? phases[std::size_t(n + 1)](cosine) : 0.0f;
+        phaseTable.push_back(phases[std::size_t(n)](cosine) - next);
+      }
+  MarchScene::Local& local = scene.locals.emplace_back();
+  for (const ProjectedLightVolume::Face& face : shadows.faces())
+    local.faces.push_back({{face.values.data(), face.table.data(), face.brickCount},
+                           face.axis,
+                           face.side,
+                           face.perTangent,
+                           face.perDepth,
+                           Vec3f(face.firstBrick * LightVolume::kBrick)});
+  for (int c = 0; c != 3; ++c) {
+    local.shadow[c] = light.shadow[c];
+    local.albedo[c] = medium.albedo[c];
+  }
+  local.decay = light.decay == Decay::quadratic ? 2 : light.decay == Decay::linear ? 1 : 0;
+  local.decayStart = light.decayStart;
+  if (light.cone) {
+    local.hasCone = true;
+    local.axis = shadows.worldToFrame().linear * normalize(light.cone->direction);
+    local.outerCosine = light.outerCosine();
+    local.perCosine = 1 / std::max(light.innerCosine() - local.outerCosine, 1e-6f);
+  }
+  local.phase = phaseTable.data();
+  local.least = 1e-3f * voxelSize;
+  toLocal.emplace_back(shadows.worldToFrame());
+}
+
+void BakedLight::setColours(const RenderVolume& volume, float most) {
+  const auto set = [](const VolumeColour::Grids& grids, MarchScene::ColourBricks& bricks) {
+    if (!grids[0]) return;
+    for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values.data();
+    bricks.table = grids[0]->table.data();
+    bricks.count = grids[0]->brickCount;
+  };
+  set(volume.colour().scattering, scene.colour);
+  set(volume.colour().emission, scene.emission);
+  scene.emissionScale = 1 / most;
+  meanAlbedo = medium.albedo * volume.meanColour();
+}
+
+// Sets what light does after its first scattering; the sky's part is that of `before` where skies are
+// equal.
+void BakedLight::scatter(const RenderVolume& volume, const BakedLight* before, const Progress& progress) {
+  const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3,
+              g = std::max(medium.phase.meanCosine(), 0.0f);
+  phases = {medium.phase};
+  scene.octaves = g > 0 ? octaves.count : 1;
+  for (int n = 1; n < scene.octaves; ++n) {
+    scene.attenuation[n] = 1 - albedo * std::pow(g, float(octaves.count - n));
+    phases.push_back(Phase::henyeyGreenstein(std::min(std::pow(g, float(n) + octaves.bend), 0.99f)));
+  }
+  const bool once = octaves.count == 1;
+  const std::size_t count = suns.size() + locals.size();
+  for (std::size_t light = 0; light <= count; ++light)
+    for (int c = 0; c != scene.colours; ++c) {
+      std::shared_ptr<const ScatteredLight> made;
+      if (light < count) {
+        if (!once)
+          made = scatteredLight(volume, c, meanAlbedo[c], octaves.gain * medium.albedo[c], sourceOf(light, c),
+                                nameOf(light), progress);
+      } else if (lights.hasSky()) {
+        if (before && before->lights.sky == lights.sky && before->sky == sky &&
+            before->scene.colours == scene.colours)
+          made = before->scattered[before->scattered.size() - std::size_t(scene.colours - c)];
+        else
+          made = scatteredLight(volume, c, once ? 0 : meanAlbedo[c], medium.albedo[c],
+                                sky ? sourceOfSky(c) : ScatteredSource::evenSky(), "sky", progress);
+      }
+      if (made) {
+        toScattered.emplace(made->worldToLattice());
+        scene.scatteredSize = made->size();
+      }
+      scattered.push_back(made);
+      scene.scattered.push_back(made ? made->values().data() : nullptr);
+    }
+  if (!toScattered) scene.scattered.clear();
+  if (volume.hasEmission() && !once && g < 1) scatterGlow(volume, g, progress);
+  // Light that flows outwards is brighter towards the eye than the mean over directions, by as much as the
+  // mean is brighter where it comes from: 3 g F, F its flux, is what the mean gains along this way.
+  const float typical = volume.typicalDensity() * medium.extinction * (1 - albedo * g);
+  lookAhead = once ? 0
+                   : std::min(octaves.lookAhead * g / std::max(typical, 1e-30f),
+                              volume.worldBounds().longestSide() / 16);
+}
+
+// What is scattered of the light of what glows: a source of its own per optical depth, wherever there is
+// density.
+void BakedLight::scatterGlow(const RenderVolume& volume, float g, const Progress& progress) {
+  if (meanAlbedo == Vec3f{}) return;
+  for (int c = 0; c != 3; ++c) {
+    const float albedo = std::max(meanAlbedo[c], 1e-3f);
+    const float share = 4 * kPi / (albedo * (1 - g) * std::max(medium.extinctionColour[c], 1e-3f));
+    ScatteredSource glowing;
+    glowing.column = [](const Vec3f&) { return 0.0f; };
+    glowing.irradiance = [&volume, c, share](const Vec3f& world) {
+      return share * volume.emissionPerDensity(world, c);
+    };
+    glow.push_back(scatteredLight(volume, c, albedo, medium.albedo[c], glowing, "glow", progress));
+    scene.glow[c] = glow.back()->values().data();
+    scene.scatteredSize = glow.back()->size();
+    toScattered.emplace(glow.back()->worldToLattice());
+  }
+}
+
+const std::string& BakedLight::nameOf(std::size_t light) const {
+  return light < distant.size() ? distant[light].name : lights.locals[light - distant.size()].name;
+}
+
+// Irradiance per gain.
+ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
+  if (light < suns.size()) {
+    ScatteredSource result = ScatteredSource::of(suns[light]);
+    result.shadow = distant[light].shadow[colour];
+    return result;
+  }
+  const LocalLight& local = lights.locals[light - suns.size()];
+  const ProjectedLightVolume& shadows = locals[light - suns.size()];
+  ScatteredSource result;
+  result.shadow = local.shadow[colour];
+  result.column = [&shadows](const Vec3f& world) { return shadows.columnDensity(world); };
+  // The mean of 1 / r^2 over a ball as large as a voxel, about the light, is that at this distance.
+  result.irradiance = [&local, least = 0.36f * voxelSize](const Vec3f& world) {
+    const Vec3f way = world - local.position;
+    return local.decayAt(std::max(length(way), least)) * local.coneAt(normalize(way));
+  };
+  return result;
+}
+
+ScatteredSource BakedLight::sourceOfSky(int colour) const {
+  ScatteredSource result;
+  result.sky = [this, colour](const std::vector<Vec3f>& towards) {
+    std::vector<float> inflow;
+    for (const Vec3f& radiance : sky->around(towards)) inflow.push_back(radiance[colour]);
+    return inflow;
+  };
+  return result;
+}
+
+// The light `from` somewhere in one colour, times `share`.
+std::shared_ptr<const ScatteredLight> BakedLight::scatteredLight(const RenderVolume& volume, int colour,
+                                                                 float albedo, float share,
+                                                                 const ScatteredSource& from,
+                                                                 const std::string& name,
+                                                                 const Progress& progress) const {
+  progress.begin("scatter " + name);
+  const auto made =
+      std::make_shared<ScatteredLight>(volume,
+                                       Scattering{scene.extinction * scene.extinctionColour[colour], albedo,
+                                                  albedo > 0 ? medium.phase.meanCosine() : 0},
+                                       from, ScatteredLight::Options{}, progress);
+  made->scale(share);
+  return made;
+}
+
+}  // namespace nephele::detail

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nephele/render/light/light_volume.h"
+#include "nephele/render/light/projected_light_volume.h"
+#include "nephele/render/light/scattered_light.h"
+#include "nephele/render/scene/environment.h"
+#include "nephele/render/scene/lights.h"
+#include "nephele/render/scene/medium.h"
+#include "nephele/render/scene/surfaces.h"
+#include "nephele/render/volume/lattice_map.h"
+#include "nephele/render/volume/march_scene.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele::detail {
+
+/// A volume, its medium and the light in it, tied together for the kernels: all that does not depend on the
+/// camera.
+struct BakedLight {
+  /// `before`, if there is one, lends the sky's part where skies are equal. Keeps a reference to `volume`.
+  BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
+             const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
+             const Surfaces* surfaces);
+  BakedLight(const BakedLight&) = delete;
+  BakedLight& operator=(const BakedLight&) = delete;
+
+  const RenderVolume* source;
+  Medium medium;
+  Lights lights;
+  Octaves octaves;
+  float voxelSize;
+  LatticeMap toDensity;
+  std::vector<LatticeMap> toSun;
+  std::optional<LatticeMap> toScattered;
+  std::vector<LightVolume> suns;
+  /// The suns of `lights`, then those of its map; what is left of that.
+  std::vector<DistantLight> distant;
+  std::optional<Environment> sky;
+  std::vector<LatticeMap> toLocal;
+  std::vector<ProjectedLightVolume> locals;
+  std::vector<float> phaseTable;
+  /// Of every result, suns, locals and sky: what multiplies it, and its place in Lights::names.
+  std::vector<Vec3f> gains;
+  Vec3f skyGain;
+  std::vector<std::size_t> layers;
+  /// As scene.scattered.
+  std::vector<std::shared_ptr<const ScatteredLight>> scattered;
+  /// As scene.glow.
+  std::vector<std::shared_ptr<const ScatteredLight>> glow;
+  /// Along a ray, to where its scattered light is read.
+  float lookAhead = 0;
+  std::vector<Vec3d> directions;
+  std::vector<Phase> phases;
+  MarchScene scene;
+  Box bounds;
+  /// Of the medium, times the mean colour of the volume.
+  Vec3f meanAlbedo;
+
+ private:
+  float columnPerDepth(const Vec3f& shadow) const;
+  template <class Light, class Columns>
+  void shadowDeeply(const RenderVolume& volume, const Light& light, Columns& columns,
+                    const Progress& progress) const;
+  void takeLights();
+  void addLocal(const LocalLight& light, const ProjectedLightVolume& shadows);
+  void code();
+  void setColours(const RenderVolume& volume, float most);
+  void scatter(const RenderVolume& volume, const BakedLight* before, const Progress& progress);
+  void scatterGlow(const RenderVolume& volume, float g, const Progress& progress);
+  const std::string& nameOf(std::size_t light) const;
+  ScatteredSource sourceOf(std::size_t light, int colour) const;
+  ScatteredSource sourceOfSky(int colour) const;
+  std::shared_ptr<const ScatteredLight> scatteredLight(const RenderVolume& volume, int colour, float albedo,
+                                                       float share, const ScatteredSource& from,
+                                                       const std::string& name,
+                                                       const Progress& progress) const;
+};
+
+}  // namespace nephele::detail

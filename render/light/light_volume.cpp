@@ -1,0 +1,391 @@
+// The sun's way through a volume, in one sweep (notes: "Precomputed Light Transmissivity").
+//
+// The lattice is the density's own, sheared: with w the index axis that the light is closest to, a node (i,
+// j, k) stands at index position (i + s k, j + t k, k), s and t being the light's slopes against w. Its third
+// axis then runs exactly along the light, its slices k coincide with the density's, and all nodes of a slice
+// lie at the same place within their voxels: a density sample is a mix with constant weights, and the
+// integral a running sum down each column, by Simpson's rule. That works for every affine map from index to
+// world space, and slopes are at most 1, so cells stay well shaped.
+//
+// Only bricks of the lattice that a brick with density reaches into are stored. Between them nothing is
+// added, so a column jumps from one to the next. Neighbouring bricks repeat the nodes they share, computed by
+// the same sums.
+//
+// Between nodes c is interpolated linearly, which overestimates it where it is curved; nodes hold c less the
+// mean of that over a cell, so that the surface of an opaque cloud, where c curves most, is not too dark.
+// Across the light, c is a sum over slices of densities that are linear between voxels: nodes at the place f
+// between them overestimate the mean of a slice by f (1 - f) / 2 times its second difference, which the
+// weights of the mix take off. Along the light, a cell overestimates by 1/12 of its step times what the
+// density grows by in it. A node takes the mean of the two cells beside it, weighted by the density that they
+// hold, since nothing is seen in an empty one, and a third more: at an edge, where cells differ, a mean
+// leaves the first cell a third of its error.
+//
+// Limits: the column is resolved at the density's own spacing; structure finer than a voxel does not exist
+// there.
+#include "nephele/render/light/light_volume.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/render/light/detail/light_slices.h"
+#include "nephele/render/scene/sub_samples.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr int kN = LightVolume::kWidth;    // nodes across a brick
+constexpr int kPatch = kN + 5;             // density samples around a brick's slice, half a slice up and down
+constexpr int kPitch = detail::kSliceRow;  // floats per row of a patch
+static_assert(kN == detail::kSliceNodes);
+
+}  // namespace
+
+/// Density samples of a plane, the first of which stands at (u, v).
+struct LightVolume::Patch {
+  int u = 0, v = 0;
+  bool empty = true;
+  alignas(64) std::array<float, (kPatch + 2) * kPitch> samples{};
+};
+
+/// The density seen along one index axis: (u, v) across, w along.
+struct LightVolume::Sweep {
+  const BrickGrid& grid;
+  int u, v, w;
+  float slopeU, slopeV;
+  /// World length of a slice along the light, and whether the light is at the upper end of w.
+  float step;
+  bool fromAbove;
+  int sampleStride[3];
+
+  Sweep(const BrickGrid& density, const Vec3f& light) : grid(density) {
+    w = 0;
+    for (int axis = 1; axis != 3; ++axis)
+      if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
+    u = w == 0 ? 1 : 0;
+    v = w == 2 ? 1 : 2;
+    slopeU = light[u] / light[w];
+    slopeV = light[v] / light[w];
+    step = 1.0f / std::fabs(light[w]);
+    fromAbove = light[w] > 0;
+    sampleStride[0] = 1;
+    sampleStride[1] = BrickGrid::kWidth;
+    sampleStride[2] = BrickGrid::kWidth * BrickGrid::kWidth;
+  }
+
+  Vec3i bricks(int bu, int bv, int bw) const {
+    Vec3i b;
+    b[u] = bu;
+    b[v] = bv;
+    b[w] = bw;
+    return b;
+  }
+
+  // The samples of the plane w = k that the nodes (u0 .. u0 + 8, v0 .. v0 + 8) need, from half a slice
+  // before to half a slice behind it. False if all are zero.
+  bool load(int u0, int v0, int k, Patch& patch) const {
+    patch.u = u0 + int(std::floor(slopeU * float(k))) - 2;
+    patch.v = v0 + int(std::floor(slopeV * float(k))) - 2;
+    patch.empty = true;
+    constexpr int size = BrickGrid::kBrick;
+    const int bw = brickOf(k);
+    for (int v1 = patch.v, vEnd = patch.v + kPatch; v1 < vEnd;) {
+      const int bv = brickOf(v1), v2 = std::min(vEnd, (bv + 1) * size);
+      for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
+        const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
+        const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
+        const bool holds = grid.ranges[std::size_t(pool)].max > 0;
+        patch.empty = patch.empty && !holds;
+        const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w] +
+                            (insideBrick(u1) + 1) * sampleStride[u];
+        const int count = u2 - u1;
+        for (int y = v1; y != v2; ++y) {
+          const float* source = from + (insideBrick(y) + 1) * sampleStride[v];
+          float* row = patch.samples.data() + (y - patch.v) * kPitch + (u1 - patch.u);
+          if (!holds)
+            std::fill_n(row, count, 0.0f);
+          else if (count == size && sampleStride[u] == 1)
+            std::copy_n(source, size, row);
+          else
+            for (int x = 0; x != count; ++x) row[x] = source[x * sampleStride[u]];
+        }
+        u1 = u2;
+      }
+      v1 = v2;
+    }
+    return !patch.empty;
+  }
+
+  // What four samples in a row count for at the place f between the middle two: linear interpolation, less
+  // what it overestimates on average, f (1 - f) / 2 times the second difference.
+  static std::array<float, 4> weights(float f) {
+    const float g = 1 - f, most = 0.5f * f * g;
+    return {-most * g, g + most * (2 * g - f), f + most * (2 * f - g), -most * f};
+  }
+
+  // Densities where the nodes from (u0, v0) on pass w, at most half a slice from the patch.
+  void interpolate(const Patch& patch, int u0, int v0, float atW, detail::SliceNodes& out) const {
+    if (patch.empty) {
+      out.fill(0.0f);
+      return;
+    }
+    const float shiftU = slopeU * atW, shiftV = slopeV * atW;
+    const float floorU = std::floor(shiftU), floorV = std::floor(shiftV);
+    const detail::SliceWeights mix{weights(shiftU - floorU), weights(shiftV - floorV)};
+    const float* first =
+        patch.samples.data() + (v0 + int(floorV) - 1 - patch.v) * kPitch + (u0 + int(floorU) - 1 - patch.u);
+    detail::mixSlice(first, mix, out);
+  }
+};
+
+LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress) {
+  require(isFinite(towards) && length(towards) > 0,
+          "light: the direction towards it must be finite and not zero");
+  const BrickGrid& grid = volume.density();
+  const Sweep sweep(grid, grid.worldToIndex.linear * normalize(towards));
+  Mat3f shear;
+  shear(0, sweep.u) = shear(1, sweep.v) = shear(2, sweep.w) = 1;
+  shear(0, sweep.w) = -sweep.slopeU;
+  shear(1, sweep.w) = -sweep.slopeV;
+  worldToLattice_ = {shear * grid.worldToIndex.linear, shear * grid.worldToIndex.translation};
+  values_.assign(kVolume, 0.0f);
+  if (volume.isEmpty()) return;
+
+  findBricks(volume, sweep);
+  parallelFor(
+      std::size_t(brickCount_.x) * brickCount_.y, 4,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t column = begin; column != end; ++column) fillColumn(sweep, column);
+      },
+      progress);
+}
+
+// Numbers the bricks of the lattice that a density brick reaches: along the light just its own, across as far
+// as the shear within it takes.
+void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
+  const auto reach = [&](const Vec3i& brick, int axis, float slope, int& first, int& last) {
+    const float a = -slope * float(brick[sweep.w] * kBrick);
+    const float b = -slope * float((brick[sweep.w] + 1) * kBrick);
+    // A node more, for interpolation beyond the last voxel, and a little for the rounding of look-ups.
+    constexpr float slack = 1.01f;
+    first = int(std::floor((float(brick[axis] * kBrick) + std::min(a, b) - slack) / kBrick));
+    last = int(std::floor((float((brick[axis] + 1) * kBrick) + std::max(a, b) + slack) / kBrick));
+  };
+  std::vector<std::array<Vec3i, 2>> reached;
+  reached.reserve(volume.occupiedBricks().size());
+  Vec3i low{1 << 30, 1 << 30, 1 << 30}, high = -low;
+  for (const Vec3i& brick : volume.occupiedBricks()) {
+    auto& [first, last] = reached.emplace_back();
+    reach(brick, sweep.u, sweep.slopeU, first.x, last.x);
+    reach(brick, sweep.v, sweep.slopeV, first.y, last.y);
+    first.z = last.z = brick[sweep.w];
+    low = min(low, first);
+    high = max(high, last);
+  }
+  firstBrick_ = low;
+  brickCount_ = high - low + Vec3i{1, 1, 1};
+  table_.assign(std::size_t(brickCount_.x) * brickCount_.y * brickCount_.z, 0);
+  for (const auto& [first, last] : reached)
+    for (int j = first.y; j <= last.y; ++j)
+      for (int i = first.x; i <= last.x; ++i)
+        table_[(std::size_t(first.z - low.z) * brickCount_.y + std::size_t(j - low.y)) * brickCount_.x +
+               std::size_t(i - low.x)] = 1;
+  std::int32_t pool = 0;
+  for (std::int32_t& brick : table_)
+    if (brick) brick = ++pool;
+  detail::resizeLarge(values_, std::size_t(pool + 1) * kVolume);
+}
+
+// Sums the density down one column of bricks, from the light on.
+void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
+  const std::size_t across = std::size_t(brickCount_.x) * brickCount_.y;
+  const int u0 = (firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick;
+  const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick;
+  const int down = sweep.fromAbove ? -1 : 1;
+  const auto poolAt = [&](int n) {
+    return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
+  };
+  detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
+  detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
+  Patch patches[2];
+  Patch *here = &patches[0], *next = &patches[1];
+  for (int n = 0; n != brickCount_.z;) {
+    if (!poolAt(n)) {
+      ++n;
+      continue;
+    }
+    int end = n;
+    while (end != brickCount_.z && poolAt(end)) ++end;
+    // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
+    const int slices = (end - n) * kBrick;
+    int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
+    at.before->fill(0.0f);
+    at.previous->fill(0.0f);
+    sweep.load(u0, v0, k, *here);
+    sweep.interpolate(*here, u0, v0, float(k), *at.density);
+    for (int slice = 0; slice <= slices; ++slice, k += down) {
+      // What the way to the next slice adds.
+      if (slice < slices && (sweep.load(u0, v0, k + down, *next) || !here->empty)) {
+        const float middle = float(k) + 0.5f * float(down);
+        const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
+        sweep.interpolate(*here, u0, v0, middle, halfHere);
+        sweep.interpolate(*next, u0, v0, middle, halfNext);
+        sweep.interpolate(*next, u0, v0, float(k + down), *at.next);
+        detail::addSlices(end1, *at.density, *at.next, middle1, halfHere, halfNext, *at.after);
+      } else {
+        at.after->fill(0.0f);
+        at.next->fill(0.0f);
+      }
+      const int brick = n + slice / kBrick, inside = slice % kBrick;
+      if (slice < slices) store(sweep, poolAt(brick), inside, sum, at);
+      if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, at);
+      detail::addSlice(*at.after, sum);
+      std::swap(at.before, at.after);
+      std::swap(at.previous, at.density);
+      std::swap(at.density, at.next);
+      std::swap(here, next);
+    }
+    n = end;
+  }
+}
+
+// Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of
+// interpolation along the light.
+void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
+                        const detail::Slices& at) {
+  const int slice = sweep.fromAbove ? kBrick - inside : inside;
+  float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
+  detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, out);
+}
+
+void detail::ColumnShade::addTo(float* values, int slice, float perDepth) const {
+  // By how many of the four points are hidden.
+  const float added[5] = {0, 0.28768207f * perDepth, 0.69314718f * perDepth, 1.38629436f * perDepth,
+                          kDark * perDepth};
+  const float sign = falls ? -1.0f : 1.0f;
+  for (int k = 0; k != LightVolume::kWidth; ++k)
+    for (const std::array<float, 4>& from : begins) {
+      int hidden = 0;
+      for (std::size_t p = 0; p != 4; ++p)
+        hidden += sign * (float(slice + k) + kQuarterCorners[p].z) > from[p];
+      *values++ += added[hidden];
+    }
+}
+
+void LightVolume::addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
+                           const Vec3f& towards, float perDepth) {
+  if (table_.empty() || box.isEmpty()) return;
+  const Affine toWorld = inverse(worldToLattice_);
+  const Vec3f slice = toWorld.linear * Vec3f{0, 0, 1};
+  Box reach;
+  for (int corner = 0; corner != 8; ++corner)
+    reach = reach.including(
+        worldToLattice_({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                         corner & 4 ? box.max.z : box.min.z}));
+  const bool falls = dot(slice, towards) > 0;
+  const float start = falls ? reach.max.z + 1 : reach.min.z - 1, sign = falls ? -1.0f : 1.0f;
+  const Vec3d way = Vec3d(slice) * double(sign);
+  const double perSlice = length(way);
+  const std::size_t across = std::size_t(brickCount_.x) * std::size_t(brickCount_.y);
+  parallelFor(across, 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column != end; ++column) {
+      const Vec3i node = (firstBrick_ + Vec3i{int(column % std::size_t(brickCount_.x)),
+                                              int(column / std::size_t(brickCount_.x)), 0}) *
+                         kBrick;
+      constexpr float margin = 1;
+      if (float(node.x) - margin > reach.max.x || float(node.x + kBrick) + margin < reach.min.x ||
+          float(node.y) - margin > reach.max.y || float(node.y + kBrick) + margin < reach.min.y)
+        continue;
+      detail::ColumnShade shade;
+      shade.falls = falls;
+      for (std::size_t m = 0; m != shade.begins.size(); ++m)
+        for (std::size_t p = 0; p != 4; ++p) {
+          const Vec3f at{float(node.x + int(m) % kWidth) + kQuarterCorners[p].x,
+                         float(node.y + int(m) / kWidth) + kQuarterCorners[p].y, start};
+          const double distance = distanceToShade({Vec3d(toWorld(at)), way * (1 / perSlice)});
+          shade.begins[m][p] = sign * start + float(distance / perSlice);
+        }
+      for (std::size_t n = 0; n != std::size_t(brickCount_.z); ++n)
+        if (const std::int32_t pool = table_[n * across + column])
+          shade.addTo(values_.data() + std::size_t(pool) * kVolume, node.z + int(n) * kBrick, perDepth);
+    }
+  });
+}
+
+void detail::replaceBrick(const std::function<float(const Vec3i&)>& column, float* out) {
+  constexpr int n = LightVolume::kWidth, wide = n + 2, plane = wide * wide;
+  std::array<float, wide * plane> values;
+  for (int k = 0; k != wide; ++k)
+    for (int j = 0; j != wide; ++j)
+      for (int i = 0; i != wide; ++i)
+        values[std::size_t(k * plane + j * wide + i)] = column({i - 1, j - 1, k - 1});
+  for (int k = 0; k != n; ++k)
+    for (int j = 0; j != n; ++j)
+      for (int i = 0; i != n; ++i) {
+        const float* at = values.data() + (k + 1) * plane + (j + 1) * wide + i + 1;
+        const float across = at[-1] + at[1] + at[-wide] + at[wide] - 4 * *at,
+                    along = at[-plane] + at[plane] - 2 * *at;
+        *out++ = *at - (2 * across + along) / 12;
+      }
+}
+
+void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
+  const Affine latticeToWorld = inverse(worldToLattice_);
+  parallelFor(table_.size(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t entry = begin; entry != end; ++entry) {
+      if (!table_[entry]) continue;
+      const auto nx = std::size_t(brickCount_.x), ny = std::size_t(brickCount_.y);
+      const Vec3i node =
+          (firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))}) * kBrick;
+      detail::replaceBrick([&](const Vec3i& at) { return column(latticeToWorld(Vec3f(node + at))); },
+                           values_.data() + std::size_t(table_[entry]) * kVolume);
+    }
+  });
+}
+
+void LightVolume::code() {
+  if (coded_.isEmpty()) coded_ = CodedBricks(std::exchange(values_, {}), table_);
+}
+
+float LightVolume::columnDensity(const Vec3f& world) const {
+  if (table_.empty()) return 0.0f;
+  const Vec3f p = worldToLattice_(world);
+  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+  const Vec3i brick{brickOf(cell.x), brickOf(cell.y), brickOf(cell.z)};
+  const Vec3i b = brick - firstBrick_;
+  for (int axis = 0; axis != 3; ++axis)
+    if (b[axis] < 0 || b[axis] >= brickCount_[axis]) return 0.0f;
+  const std::size_t place =
+      (std::size_t(b.z) * brickCount_.y + std::size_t(b.y)) * brickCount_.x + std::size_t(b.x);
+  const auto node = [&](const Vec3i& n) {
+    if (!coded_.isEmpty()) return coded_.at(place, n);
+    return values_[std::size_t(table_[place]) * kVolume + std::size_t((n.z * kWidth + n.y) * kWidth + n.x)];
+  };
+  const Vec3i at = cell - brick * kBrick;
+  const Vec3f f = p - Vec3f(cell);
+  float sum = 0;
+  for (int corner = 0; corner != 8; ++corner) {
+    const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+    const float weight = (dx ? f.x : 1 - f.x) * (dy ? f.y : 1 - f.y) * (dz ? f.z : 1 - f.z);
+    sum += weight * node(at + Vec3i{dx, dy, dz});
+  }
+  return sum;
+}
+
+double LightVolume::estimateBytes(const RenderVolume& volume) {
+  // Sheared by 45 degrees both ways, a brick reaches into at most 3 x 3; bricks side by side share all but
+  // the rim.
+  const Vec3f size = volume.indexBounds().isEmpty() ? Vec3f{} : volume.indexBounds().size() * (1.0f / kBrick);
+  double box = 0;
+  for (int w = 0; w != 3; ++w)
+    box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
+  const double bricks = std::min(9.0 * double(volume.occupiedBricks().size()), box);
+  return bricks * kVolume * sizeof(float) + box * (sizeof(std::int32_t) + sizeof(CodedBricks::Entry));
+}
+
+}  // namespace nephele

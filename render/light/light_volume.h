@@ -1,0 +1,113 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "nephele/modeling/base/progress.h"
+#include "nephele/render/scene/camera.h"
+#include "nephele/render/volume/coded_bricks.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele {
+
+namespace detail {
+struct SliceNodes;
+struct Slices;
+}  // namespace detail
+
+/// How much density lies between every point of a volume and a distant light, on a lattice whose third axis
+/// runs along the light.
+///
+/// Holds  c(x) = integral of density from x towards the light,  so that light reaches x times exp(-extinction
+/// c(x)). It is smooth where the light is not: interpolated linearly it errs by O(h^2) however opaque a voxel
+/// is. Known wherever the volume holds density, and not outside. Nodes are as far apart as the density's
+/// voxels.
+class LightVolume {
+ public:
+  static constexpr int kBrick = 8;
+  static constexpr int kWidth = kBrick + 1;
+  static constexpr int kVolume = kWidth * kWidth * kWidth;
+
+  /// @param towards world-space direction towards the light, not zero.
+  /// Cost: one sample of density per node of the bricks that hold density, one sweep, no march.
+  /// @throws Error if `towards` is zero or not finite.
+  LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent());
+
+  /// Sets c at every node to `column` of its place in the world, in place of the sweep's; it is taken to be
+  /// interpolated itself, between rays that are as far apart as nodes. Uses all cores.
+  void replace(const std::function<float(const Vec3f&)>& column);
+
+  /// From world space to this lattice, whose nodes are integers.
+  const Affine& worldToLattice() const { return worldToLattice_; }
+  Vec3i firstBrick() const { return firstBrick_; }
+  Vec3i brickCount() const { return brickCount_; }
+  /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros.
+  const std::vector<std::int32_t>& table() const { return table_; }
+  /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells. Empty once coded.
+  const std::vector<float>& values() const { return values_; }
+
+  /// Codes the values for the march, in their own memory: the last thing to do, since neither `replace` nor
+  /// `addShade` may follow. Uses all cores.
+  /// @throws Error if there are more than 5.8 million bricks.
+  void code();
+  /// Empty until `code`.
+  const CodedBricks& coded() const { return coded_; }
+
+  /// Adds the shadow of opaque things within `box` to c: where a ray from the light, which starts outside of
+  /// the box and travels against `towards`, has met one after distanceToShade(ray), infinite if it meets
+  /// none. Edges are a voxel wide: four rays per column of nodes, a quarter of a node apart. Full shadow adds
+  /// detail::kDark times `perDepth`, the column of an optical depth of 1. Uses all cores.
+  void addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
+                const Vec3f& towards, float perDepth);
+
+  /// c at a world-space point. Slow; for tests.
+  float columnDensity(const Vec3f& world) const;
+  std::size_t memoryBytes() const {
+    return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t) + coded_.memoryBytes();
+  }
+
+  /// Upper bound of the bytes that a light volume of `volume` takes, whatever the direction.
+  static double estimateBytes(const RenderVolume& volume);
+
+ private:
+  struct Sweep;
+  struct Patch;
+
+  void findBricks(const RenderVolume& volume, const Sweep& sweep);
+  void fillColumn(const Sweep& sweep, std::size_t column);
+  void store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
+             const detail::Slices& at);
+
+  Affine worldToLattice_;
+  Vec3i firstBrick_, brickCount_;
+  std::vector<std::int32_t> table_;
+  std::vector<float> values_;
+  CodedBricks coded_;
+};
+
+namespace detail {
+/// Optical depth of a full shadow.
+inline constexpr float kDark = 40.0f;
+
+/// Where shadow begins along the node columns of a column of bricks, for the four points around every node.
+struct ColumnShade {
+  static constexpr int kColumns = LightVolume::kWidth * LightVolume::kWidth;
+  /// In slices, infinite if there is none; on the way from the light, against which slices count where
+  /// `falls`.
+  std::array<std::array<float, 4>, kColumns> begins;
+  bool falls = false;
+
+  ColumnShade() { begins.fill({INFINITY, INFINITY, INFINITY, INFINITY}); }
+  /// Adds it to the nodes of a brick whose first slice is `slice`.
+  void addTo(float* values, int slice, float perDepth) const;
+};
+
+/// The nodes of a brick from `column` of each, also of those a node outside of it, less the mean error of
+/// linear interpolation: once along the light, twice across, see LightVolume::replace.
+void replaceBrick(const std::function<float(const Vec3i&)>& column, float* out);
+}  // namespace detail
+
+}  // namespace nephele

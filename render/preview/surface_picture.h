@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "nephele/modeling/base/progress.h"
+#include "nephele/render/image/image.h"
+#include "nephele/render/scene/surfaces.h"
+
+namespace nephele {
+
+struct SurfacePictureOptions {
+  int width = 1280, height = 720;
+  /// Where the camera stands; it frames all objects.
+  float azimuthDegrees = 0.0f, elevationDegrees = 14.0f;
+  /// Share of the frame left free on each side.
+  float margin = 0.05f;
+  /// Rays per pixel, fewer where there is only open ground.
+  int samples = 48;
+};
+
+/// Objects without a volume, standing on a ground that fades into the backdrop, in the soft light of a lamp
+/// and a sky. Channels R, G, B, A, linear, opaque. The same at any number of threads.
+/// @throws Error if there are no objects, one of them cannot be shown (see Surfaces) or an option is outside
+/// its range; Cancelled.
+Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options = {},
+                      const Progress& progress = silent());
+
+}  // namespace nephele

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+
+#include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
+#include "nephele/render/image/image.h"
+
+namespace nephele {
+
+struct TransferPictureOptions {
+  int width = 1280, height = 640;
+  /// Where the camera stands, seen from either shape.
+  float azimuthDegrees = 30.0f, elevationDegrees = 12.0f;
+  /// Fields of a chess board across the unit square of texture coordinates, where there is no texture.
+  int checkers = 32;
+  int samples = 48;
+};
+
+/// The reference on the left and the object on the right, equally large and seen from the same side, with a
+/// checker or pictures on their texture coordinates: `texture` that of the reference, `objectTexture` that of
+/// the object, else the same.
+/// @throws Error if a mesh has no faces or no corner attribute "uv", or an option is outside its range;
+/// Cancelled.
+Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr<const Image> texture,
+                      std::shared_ptr<const Image> objectTexture, const TransferPictureOptions& options = {},
+                      const Progress& progress = silent());
+
+}  // namespace nephele

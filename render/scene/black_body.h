@@ -1,0 +1,16 @@
+#pragma once
+
+#include "nephele/modeling/base/math.h"
+
+namespace nephele {
+
+/// CIE 1931 tristimulus values of a black body, from Planck's law; Y is 1 at 2000 K.
+/// 0 at 0 K and below.
+Vec3d blackBodyXyz(double kelvin);
+
+/// Colour of a black body in linear Rec.709, luminance 1 at 2000 K, a bright fire: a candle (1850 K) has a
+/// third of it, 1000 K six millionths, 3000 K 65 times as much. Colours outside of Rec.709 (below 1900 K,
+/// where blue is negative) have those channels at 0. 0 at 0 K and below. Cost: some 80 exponentials.
+Vec3f blackBody(double kelvin);
+
+}  // namespace nephele

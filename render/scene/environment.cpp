@@ -1,0 +1,234 @@
+// Skies from pictures.
+//
+// A pixel covers the solid angle (2 pi / width) (cos above - cos below). Directions are drawn by inversion of
+// the cumulative luminance, first of rows, then within the row, and evenly within the pixel: since radiance
+// is constant there, the density is luminance over its integral, exactly.
+//
+// Source: inversion of tabulated distributions, any textbook of rendering (Pharr, Jakob, Humphreys).
+// Limits: pixels show as such where the sky is looked at directly.
+#include "nephele/render/scene/environment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/image.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr float kSpotDegrees = 5, kRingDegrees = 8;
+
+double luminance(const Vec3f& c) {
+  return 0.2126 * double(c.x) + 0.7152 * double(c.y) + 0.0722 * double(c.z);
+}
+
+std::size_t drawn(const double* cumulative, std::size_t count, double value) {
+  const double* at = std::upper_bound(cumulative, cumulative + count, value);
+  return std::min(std::size_t(at - cumulative), count - 1);
+}
+
+}  // namespace
+
+struct Environment::Data {
+  int width, height;
+  std::vector<Vec3f> radiance;
+  /// Integral of radiance over all directions, and of luminance.
+  Vec3d whole{};
+  double bright = 0;
+  /// Cumulative luminance of rows, and of the pixels of every row, each times its solid angle.
+  std::vector<double> rows, pixels;
+
+  Data(int itsWidth, int itsHeight, std::vector<Vec3f> values)
+      : width(itsWidth), height(itsHeight), radiance(std::move(values)) {
+    rows.reserve(std::size_t(height));
+    pixels.reserve(radiance.size());
+    for (int y = 0; y != height; ++y) {
+      double row = 0;
+      const double share = solidAngle(y);
+      for (int x = 0; x != width; ++x) {
+        const Vec3f& value = radiance[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+        whole += Vec3d(value) * share;
+        row += luminance(value) * share;
+        pixels.push_back(row);
+      }
+      bright += row;
+      rows.push_back(bright);
+    }
+  }
+
+  double cosineAbove(int y) const { return std::cos(double(kPi) * y / height); }
+  double solidAngle(int y) const { return 2 * double(kPi) / width * (cosineAbove(y) - cosineAbove(y + 1)); }
+};
+
+Environment::Environment(int width, int height, std::vector<Vec3f> radiance, const Options& options) {
+  require(height >= 1 && width == 2 * height && radiance.size() == std::size_t(width) * std::size_t(height),
+          fmt::format("sky: expected a map twice as wide as high, got {} x {}", width, height));
+  require(std::isfinite(options.rotationDegrees),
+          fmt::format("sky: expected a rotation that is finite, got {}", options.rotationDegrees));
+  require(options.intensity >= 0 && options.intensity <= 1e6f,
+          fmt::format("sky: expected an intensity within [0, 1e6], got {}", options.intensity));
+  for (Vec3f& value : radiance)
+    for (int c = 0; c != 3; ++c) {
+      require(std::isfinite(value[c]), "sky: the map holds numbers that are not finite");
+      value[c] = std::max(value[c], 0.0f) * options.intensity;
+    }
+  data_ = std::make_shared<const Data>(width, height, std::move(radiance));
+  rotation_ = std::remainder(double(options.rotationDegrees), 360.0);
+}
+
+Environment Environment::read(const std::string& path, const Options& options) {
+  const Image image = readImage(path);
+  const bool grey = !image.find("R") && image.find("Y");
+  const Image::Channel* channels[3];
+  for (int c = 0; c != 3; ++c) {
+    channels[c] = image.find(grey ? "Y" : c == 0 ? "R" : c == 1 ? "G" : "B");
+    require(channels[c], fmt::format("{}: expected the channels R, G, B, or Y, for a sky", path));
+  }
+  std::vector<Vec3f> radiance(channels[0]->values.size());
+  for (std::size_t i = 0; i != radiance.size(); ++i)
+    radiance[i] = {channels[0]->values[i], channels[1]->values[i], channels[2]->values[i]};
+  try {
+    return Environment(image.width, image.height, std::move(radiance), options);
+  } catch (const Error& error) {
+    throw Error(path + ": " + error.what());
+  }
+}
+
+Environment Environment::turned(double degrees) const {
+  Environment result = *this;
+  result.rotation_ = std::remainder(rotation_ + degrees, 360.0);
+  return result;
+}
+
+// `column` may be a fraction.
+Vec3f Environment::towards(double column, double cosine) const {
+  const double azimuth = (0.5 - column / data_->width) * 2 * double(kPi) + rotation_ * double(kPi) / 180;
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  return Vec3f(Vec3d{std::sin(azimuth) * sine, cosine, std::cos(azimuth) * sine});
+}
+
+std::size_t Environment::pixelAt(const Vec3f& towards) const {
+  const Vec3d d = normalize(Vec3d(towards));
+  const double turns = (std::atan2(d.x, d.z) - rotation_ * double(kPi) / 180) / (2 * double(kPi));
+  const double u = 0.5 - turns;
+  const int x = std::clamp(int((u - std::floor(u)) * data_->width), 0, data_->width - 1);
+  const double v = std::acos(std::clamp(d.y, -1.0, 1.0)) / double(kPi);
+  const int y = std::clamp(int(v * data_->height), 0, data_->height - 1);
+  return std::size_t(y) * std::size_t(data_->width) + std::size_t(x);
+}
+
+Vec3f Environment::radiance(const Vec3f& towards) const {
+  return data_->radiance[pixelAt(towards)];
+}
+
+Vec3f Environment::mean() const {
+  return Vec3f(data_->whole * (0.25 / double(kPi)));
+}
+
+std::vector<Vec3f> Environment::around(const std::vector<Vec3f>& directions) const {
+  std::vector<Vec3d> sums(directions.size());
+  std::vector<double> angles(directions.size());
+  for (int y = 0; y != data_->height; ++y) {
+    const double share = data_->solidAngle(y);
+    const double cosine = (data_->cosineAbove(y) + data_->cosineAbove(y + 1)) / 2;
+    for (int x = 0; x != data_->width; ++x) {
+      const Vec3f d = towards(x + 0.5, cosine);
+      std::size_t nearest = 0;
+      float most = -2;
+      for (std::size_t i = 0; i != directions.size(); ++i)
+        if (const float c = dot(directions[i], d); c > most) most = c, nearest = i;
+      sums[nearest] +=
+          Vec3d(data_->radiance[std::size_t(y) * std::size_t(data_->width) + std::size_t(x)]) * share;
+      angles[nearest] += share;
+    }
+  }
+  std::vector<Vec3f> result(directions.size());
+  Vec3d meanOfMeans;
+  for (std::size_t i = 0; i != result.size(); ++i) {
+    // A map too small to reach every direction: its pixel there.
+    const Vec3d value = angles[i] > 0 ? sums[i] / angles[i] : Vec3d(radiance(directions[i]));
+    meanOfMeans += value / double(result.size());
+    result[i] = Vec3f(value);
+  }
+  const Vec3d wanted(data_->whole * (0.25 / double(kPi)));
+  for (Vec3f& value : result)
+    for (int c = 0; c != 3; ++c)
+      if (meanOfMeans[c] > 0) value[c] = float(double(value[c]) * (wanted[c] / meanOfMeans[c]));
+  return result;
+}
+
+Environment::Sample Environment::sample(float u1, float u2, float u3, float u4) const {
+  const auto width = std::size_t(data_->width);
+  const std::size_t y = drawn(data_->rows.data(), data_->rows.size(), double(u1) * data_->bright);
+  const double* row = data_->pixels.data() + y * width;
+  const std::size_t x = drawn(row, width, double(u2) * row[width - 1]);
+  const double above = data_->cosineAbove(int(y)), below = data_->cosineAbove(int(y) + 1);
+  const double bright = data_->bright;
+  return {towards(double(x) + double(u3), above + double(u4) * (below - above)),
+          bright > 0 ? float(luminance(data_->radiance[y * width + x]) / bright) : 0.0f};
+}
+
+float Environment::density(const Vec3f& towards) const {
+  return data_->bright > 0 ? float(luminance(radiance(towards)) / data_->bright) : 0.0f;
+}
+
+std::vector<DistantLight> Environment::takeSpots(int most) {
+  std::vector<DistantLight> spots;
+  const auto width = std::size_t(data_->width);
+  std::vector<Vec3f> radiance = data_->radiance;
+  const double mean = data_->bright * (0.25 / double(kPi));
+  while (int(spots.size()) < most) {
+    const auto peak = std::max_element(radiance.begin(), radiance.end(), [](const Vec3f& a, const Vec3f& b) {
+      return luminance(a) < luminance(b);
+    });
+    if (!(luminance(*peak) > 10 * mean)) break;
+    const auto directionOf = [&](std::size_t pixel) {
+      const int y = int(pixel / width);
+      return towards(double(pixel % width) + 0.5, (data_->cosineAbove(y) + data_->cosineAbove(y + 1)) / 2);
+    };
+    const Vec3f middle = directionOf(std::size_t(peak - radiance.begin()));
+    const float inner = std::cos(radians(kSpotDegrees)), outer = std::cos(radians(kRingDegrees));
+    std::vector<std::size_t> inside;
+    std::vector<Vec3f> before;
+    Vec3d ring;
+    double ringAngle = 0;
+    for (std::size_t i = 0; i != radiance.size(); ++i) {
+      const float c = dot(directionOf(i), middle);
+      if (c >= inner) {
+        inside.push_back(i);
+        before.push_back(radiance[i]);
+      } else if (c >= outer) {
+        const double share = data_->solidAngle(int(i / width));
+        ring += Vec3d(radiance[i]) * share;
+        ringAngle += share;
+      }
+    }
+    const Vec3f level = ringAngle > 0 ? Vec3f(ring / ringAngle) : Vec3f{};
+    Vec3d excess, direction;
+    for (const std::size_t i : inside) {
+      const Vec3f left = min(radiance[i], level);
+      const Vec3d gain = Vec3d(radiance[i] - left) * data_->solidAngle(int(i / width));
+      excess += gain;
+      direction += Vec3d(directionOf(i)) * luminance(Vec3f(gain));
+      radiance[i] = left;
+    }
+    if (luminance(Vec3f(excess)) < 0.01 * data_->bright) {
+      // Too little to be a light of its own: as it was, and so are all that are less bright.
+      for (std::size_t i = 0; i != inside.size(); ++i) radiance[inside[i]] = before[i];
+      break;
+    }
+    DistantLight spot;
+    spot.direction = Vec3f(normalize(direction));
+    spot.irradiance = Vec3f(excess);
+    spots.push_back(spot);
+  }
+  if (!spots.empty()) data_ = std::make_shared<const Data>(data_->width, data_->height, std::move(radiance));
+  return spots;
+}
+
+}  // namespace nephele

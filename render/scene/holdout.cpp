@@ -1,0 +1,94 @@
+// Optical depth in front of every depth, pixel by pixel, from deep samples.
+//
+// A sample's optical depth -log(1 - alpha) is spread evenly from its front to its back; those of all samples
+// add up, so that overlaps need no splitting. A sample without thickness is a jump: two knots at one depth.
+#include "nephele/render/scene/holdout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+
+namespace {
+
+// More than any float can tell from opaque.
+constexpr float kOpaque = 200.0f;
+
+struct Change {
+  float depth;
+  double slope, jump;
+};
+
+void addKnots(const std::vector<DeepSample>& samples, std::vector<Change>& changes,
+              std::vector<HoldoutCurve::Knot>& knots) {
+  changes.clear();
+  for (const DeepSample& sample : samples) {
+    const float alpha = std::clamp(sample.alpha, 0.0f, 1.0f);
+    if (alpha == 0 || std::isinf(sample.z)) continue;
+    const double depth = alpha == 1 ? kOpaque : -std::log1p(-double(alpha));
+    const bool thick = sample.zBack > sample.z && std::isfinite(sample.zBack) && alpha < 1;
+    if (thick) {
+      const double slope = depth / (double(sample.zBack) - sample.z);
+      changes.push_back({sample.z, slope, 0});
+      changes.push_back({sample.zBack, -slope, 0});
+    } else {
+      changes.push_back({sample.z, 0, depth});
+    }
+  }
+  std::stable_sort(changes.begin(), changes.end(),
+                   [](const Change& a, const Change& b) { return a.depth < b.depth; });
+  double depth = 0, slope = 0, at = changes.empty() ? 0 : changes.front().depth;
+  for (std::size_t i = 0; i != changes.size();) {
+    const float z = changes[i].depth;
+    depth += std::max(slope, 0.0) * (z - at);
+    at = z;
+    knots.push_back({z, float(depth)});
+    double jump = 0;
+    for (; i != changes.size() && changes[i].depth == z; ++i) {
+      slope += changes[i].slope;
+      jump += changes[i].jump;
+    }
+    if (jump > 0) knots.push_back({z, float(depth += jump)});
+  }
+}
+
+}  // namespace
+
+Holdout::Holdout(const DeepImage& image)
+    : display_(image.display.value_or(Image::Display{0, 0, image.width, image.height})),
+      width_(image.width),
+      height_(image.height) {
+  std::vector<Change> changes;
+  start_.reserve(image.pixels.size() + 1);
+  for (const auto& samples : image.pixels) {
+    start_.push_back(knots_.size());
+    addKnots(samples, changes, knots_);
+  }
+  start_.push_back(knots_.size());
+}
+
+HoldoutCurve Holdout::at(int x, int y) const {
+  x -= display_.x;
+  y -= display_.y;
+  if (x < 0 || y < 0 || x >= width_ || y >= height_) return {};
+  const std::size_t pixel = std::size_t(y) * width_ + x;
+  return {knots_.data() + start_[pixel], start_[pixel + 1] - start_[pixel]};
+}
+
+std::size_t Holdout::memoryBytes() const {
+  return start_.size() * sizeof(std::size_t) + knots_.size() * sizeof(HoldoutCurve::Knot);
+}
+
+std::shared_ptr<const Holdout> readHoldout(const std::string& path, const Camera& camera, double mostBytes) {
+  auto holdout = std::make_shared<const Holdout>(readDeepExr(path, mostBytes));
+  if (holdout->width() != camera.width() || holdout->height() != camera.height())
+    throw Error(fmt::format("{}: is for pictures of {}x{}, but this one has {}x{}", path, holdout->width(),
+                            holdout->height(), camera.width(), camera.height()));
+  return holdout;
+}
+
+}  // namespace nephele

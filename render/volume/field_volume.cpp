@@ -1,0 +1,154 @@
+// From a field to what is marched, at the resolution of the picture.
+//
+// The march itself reads bricks, since light has to be known everywhere before the first ray and a grid is
+// read faster than most fields are evaluated. What a grid would cost is the choice of its voxel size, which
+// the camera makes: an octree of ranges finds the density that the picture shows and the depth at which a
+// pixel is narrowest, and the voxels become as wide as that. A second walk counts the bricks that such voxels
+// need; where there are too many, voxels grow.
+//
+// Limits: one voxel size for the whole volume, that of its nearest part.
+#include "nephele/render/volume/field_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+#include "nephele/render/volume/field_density.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr int kLevels = 6;
+constexpr float kFinest = 1e-5f;
+
+Box octant(const Box& box, int index) {
+  const Vec3f middle = (box.min + box.max) * 0.5f;
+  Box part;
+  for (int axis = 0; axis != 3; ++axis) {
+    const bool upper = index >> axis & 1;
+    part.min[axis] = upper ? middle[axis] : box.min[axis];
+    part.max[axis] = upper ? box.max[axis] : middle[axis];
+  }
+  return part;
+}
+
+// The smallest width that a pixel has in the part of `box` that the picture may show; infinite where it shows
+// none of it.
+double narrowestPixel(const Camera& camera, const Box& box) {
+  const PixelBox window = camera.window();
+  double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
+  double low[2] = {nearest, nearest}, high[2] = {farthest, farthest};
+  for (int corner = 0; corner != 8; ++corner) {
+    const Vec3d p{double(corner & 1 ? box.max.x : box.min.x), double(corner & 2 ? box.max.y : box.min.y),
+                  double(corner & 4 ? box.max.z : box.min.z)};
+    const Vec3d seen = camera.project(p);
+    nearest = std::min(nearest, seen.z);
+    farthest = std::max(farthest, seen.z);
+    if (!(seen.z > 0)) continue;
+    for (int axis = 0; axis != 2; ++axis) {
+      low[axis] = std::min(low[axis], seen[axis]);
+      high[axis] = std::max(high[axis], seen[axis]);
+    }
+  }
+  if (!(farthest > 0)) return std::numeric_limits<double>::infinity();
+  // Corners behind the camera have no place in the picture, so boxes around it count as shown.
+  const bool isShown = nearest <= 0 || (high[0] >= window.x0 - 1 && low[0] <= window.x1 + 1 &&
+                                        high[1] >= window.y0 - 1 && low[1] <= window.y1 + 1);
+  return isShown ? camera.pixelWidth(std::max(nearest, 0.0)) : std::numeric_limits<double>::infinity();
+}
+
+double narrowest(const ScalarField& density, const std::vector<Camera>& cameras, const Box& box, int level,
+                 const Progress& progress) {
+  if (!(density.range(box).max > 0)) return std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Camera& camera : cameras) least = std::min(least, narrowestPixel(camera, box));
+  if (level == 0 || std::isinf(least)) return least;
+  progress.check();
+  const ScalarField here = density.restrictedTo(box);
+  least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i != 8; ++i)
+    least = std::min(least, narrowest(here, cameras, octant(box, i), level - 1, progress));
+  return least;
+}
+
+// Bricks with values of their own that voxels of this size need, up to a little more than `most`.
+double brickCount(const ScalarField& density, const Box& box, float voxelSize, double most,
+                  const Progress& progress) {
+  const Interval range = density.range(box);
+  if (!(range.max > 0) || range.isPoint()) return 0;
+  const float brick = voxelSize * BrickGrid::kBrick;
+  if (box.longestSide() <= brick) return 1;
+  progress.check();
+  const ScalarField here = density.restrictedTo(box);
+  double sum = 0;
+  for (int i = 0; i != 8 && sum <= most; ++i)
+    sum += brickCount(here, octant(box, i), voxelSize, most - sum, progress);
+  return sum;
+}
+
+void check(const FieldVolumeOptions& options) {
+  require(!options.box.isEmpty() && isFinite(options.box.min) && isFinite(options.box.max) &&
+              options.box.longestSide() > 0,
+          "field volume: expected a box that is bounded and not empty");
+  require(std::isfinite(options.voxelsPerPixel) && options.voxelsPerPixel > 0,
+          fmt::format("voxels per pixel: expected a finite number > 0, got {}", options.voxelsPerPixel));
+  require(options.mostBytes > 0, fmt::format("most bytes: expected a number > 0, got {}", options.mostBytes));
+}
+
+}  // namespace
+
+float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                     const Progress& progress) {
+  check(options);
+  std::vector<Camera> cameras{camera};
+  if (camera.isMoving()) cameras = {camera.stillAt(0), camera.stillAt(0.5), camera.stillAt(1)};
+  const float side = options.box.longestSide();
+  const double pixel = narrowest(density, cameras, options.box, kLevels, progress);
+  float voxelSize = std::isinf(pixel) ? side / 64 : float(pixel / double(options.voxelsPerPixel));
+  voxelSize = std::max(voxelSize, kFinest * side);
+
+  // A cube about the box, so that octants end as cubes; it does not matter how far it reaches beyond.
+  const Vec3f size{side, side, side};
+  const Box cube{options.box.min, options.box.min + size};
+  const double most = std::max(options.mostBytes / (BrickGrid::kVolume * sizeof(float)), 1.0);
+  while (voxelSize * BrickGrid::kBrick < side && brickCount(density, cube, voxelSize, most, progress) > most)
+    voxelSize *= 1.25f;
+  return voxelSize;
+}
+
+RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                         const Progress& progress) {
+  progress.begin("field");
+  BakeOptions baking;
+  baking.voxelSize = fieldVoxelSize(density, camera, options, progress);
+  baking.box = options.box;
+  baking.background = 0.0f;
+  return RenderVolume(bakeGrid(max(density, 0.0f), baking, progress));
+}
+
+RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
+                            const Progress& progress) {
+  auto field = std::make_shared<const FieldDensity>(density, box, voxelSize, progress);
+  const ScalarField positive = max(density, 0.0f);
+  ScalarField mean(0.0f);
+  for (int corner = 0; corner != 8; ++corner) {
+    const Vec3f way{corner & 1 ? 0.25f : -0.25f, corner & 2 ? 0.25f : -0.25f, corner & 4 ? 0.25f : -0.25f};
+    mean = mean + translate(positive, way * voxelSize);
+  }
+  progress.begin("field");
+  BakeOptions baking;
+  baking.voxelSize = voxelSize;
+  baking.box = box;
+  baking.background = 0.0f;
+  return RenderVolume::ofField(bakeGrid(mean * 0.125f, baking, progress), std::move(field));
+}
+
+}  // namespace nephele

@@ -1,0 +1,53 @@
+#pragma once
+
+#include "nephele/modeling/base/box.h"
+#include "nephele/modeling/base/progress.h"
+#include "nephele/modeling/field/field.h"
+#include "nephele/render/scene/camera.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele {
+
+/// How finely a field is looked at.
+struct FieldVolumeOptions {
+  /// Where there may be density, world units; outside there is none.
+  Box box;
+  /// Voxels across a pixel, at the place nearest to the camera where the picture shows density.
+  float voxelsPerPixel = 1.0f;
+  /// Bytes that the bricks may take; voxels grow until they fit.
+  double mostBytes = 1e9;
+};
+
+/// The voxel size of `fieldVolume`, world units: the width of a pixel there, over voxelsPerPixel, but no less
+/// than a 10^5th of the box and as much more as the memory asks for. A 64th of the box where the picture
+/// shows no density. Cost: ranges of the field over some 10^4 boxes, and more where the memory is short.
+/// @throws Error if the box is empty or unbounded, or a number is not above 0.
+float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                     const Progress& progress = silent());
+
+/// A density that is a field and not a grid, as finely as the picture of `camera` can show it: nobody has to
+/// choose a voxel size. Ranges of the field tell where it is above zero, and only there it is evaluated;
+/// values below zero count as zero. Come nearer, and there is more to see, as long as the memory lasts: a
+/// camera inside the density gets what `mostBytes` allow.
+///
+/// Structure narrower than two voxels is sampled and not averaged. Moving cameras are asked for where the
+/// shutter opens, is half open and closes. The same bits at any number of threads.
+/// @throws Error as fieldVoxelSize and bakeGrid do; Cancelled.
+RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                         const Progress& progress = silent());
+
+/// A density that rays ask the field for: no grid is between it and the picture, and detail is as fine as the
+/// picture asks for, see FieldDensity and Refinement. Values below zero count as zero; outside of the box
+/// there is none.
+///
+/// Only the light is worked out on a grid, whose voxels of `voxelSize` (world units) hold the mean of 8
+/// places in each: shadows are as soft as that. Where nothing else is known, `fieldVoxelSize` for some 2
+/// pixels per voxel is a good choice. Pictures, deep ones and layers come from the field, normals and what
+/// falls on objects from the grid; the path tracer and combined volumes take grids only. Cost: 8 evaluations
+/// per voxel and ranges of the voxels wherever the density varies.
+/// @throws Error as FieldDensity and bakeGrid do, or if the grid finds nothing of a field that may not be
+/// empty; Cancelled.
+RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
+                            const Progress& progress = silent());
+
+}  // namespace nephele

@@ -1,0 +1,302 @@
+// What a marcher needs to know about a density before the first ray.
+//
+// Empty space: for every brick the Chebyshev distance to the nearest occupied one, and for constant ones to
+// the nearest other. It is exact after one forward and one backward pass per axis, since the distance is a
+// maximum over axes and the passes take it one axis at a time: the minimum over y of max(|y|, d(y)) only
+// needs d to be known along the axes done before. A ray then leaves whole boxes of empty bricks in one step,
+// so that its cost follows what is there and not how finely the box around it is divided.
+//
+// Bounds: a brick whose six neighbours are full lies inside the hull of the rest, so only the others are
+// looked into.
+#include "nephele/render/volume/render_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/render/volume/field_density.h"
+
+namespace nephele {
+
+namespace {
+// Bricks that a ray may leave behind at once; more would cost the passes more than it saves the rays.
+constexpr std::uint8_t kFarthest = 32;
+
+// Lowers entries of a table of `n` entries to their distance from the nearest that is 0, if that is less.
+void spread(std::vector<std::uint8_t>& distances, const Vec3i& n) {
+  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
+  for (int axis = 0; axis != 3; ++axis) {
+    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
+    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
+      std::vector<int> line(along), nearest(along);
+      for (std::size_t j = begin; j != end; ++j)
+        for (int i = 0; i != n[a]; ++i) {
+          std::uint8_t* start = distances.data() + j * stride[b] + std::size_t(i) * stride[a];
+          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
+          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
+          // can improve.
+          for (int k = 0; k != along; ++k) {
+            int best = line[k];
+            for (int step = 1; step < best; ++step) {
+              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
+              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
+            }
+            nearest[k] = best;
+          }
+          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
+        }
+    });
+  }
+}
+
+}  // namespace
+
+RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour)
+    : density_(std::move(density)), colour_(std::move(colour)) {
+  require(density_ != nullptr, "render volume: no density given");
+  require(!density_->isPacked(), "render volume: the density must not be packed");
+  const BrickGrid& grid = *density_;
+  require(grid.background == 0.0f,
+          fmt::format("density: expected 0 outside of the volume, but its background is {}{}",
+                      grid.background, grid.background > 0 ? "; is it a level set?" : ""));
+  require(grid.values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+          fmt::format(
+              "density: {} distinct bricks are more than the {} that can be marched; use a larger voxel size",
+              grid.poolSize(), std::numeric_limits<std::int32_t>::max() / BrickGrid::kVolume));
+  for (const Interval& range : grid.ranges)
+    require(std::isfinite(range.min) && std::isfinite(range.max),
+            "density: contains values that are not finite");
+  // Extinctions and optical depths are floats, too.
+  constexpr float most = 1e18f;
+  for (const Interval& range : grid.ranges)
+    require(range.max <= most && range.min >= -most,
+            fmt::format("density: expected values up to {:g}, got {:g}", most,
+                        range.max > most ? range.max : range.min));
+  checkColour(colour_.scattering, "colour");
+  checkColour(colour_.emission, "emission");
+  findOccupied();
+  measureColour();
+  if (isEmpty()) return;
+  measureEmptiness();
+  measureUniformity();
+  measureBounds();
+  const Vec3f reach =
+      max(max(worldBounds().max, -worldBounds().max), max(worldBounds().min, -worldBounds().min));
+  const float farthest = std::max({reach.x, reach.y, reach.z});
+  require(
+      farthest < 2e6f * grid.voxelSize,
+      fmt::format("density: stands {:g} from the origin, where voxels of {:g} can no longer be told apart; "
+                  "move it nearer",
+                  farthest, grid.voxelSize));
+}
+
+RenderVolume RenderVolume::ofField(std::shared_ptr<const BrickGrid> density,
+                                   std::shared_ptr<const FieldDensity> field) {
+  require(field != nullptr, "render volume: no field given");
+  RenderVolume volume(std::move(density));
+  require(!volume.isEmpty() || field->isEmpty(),
+          fmt::format("render volume: nothing of the field is found with voxels of {}; use smaller ones",
+                      volume.density().voxelSize));
+  volume.field_ = std::move(field);
+  return volume;
+}
+
+void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* name) const {
+  const auto laidOutAs = [](const BrickGrid& a, const BrickGrid& b) {
+    return a.firstBrick == b.firstBrick && a.brickCount == b.brickCount &&
+           a.worldToIndex.translation == b.worldToIndex.translation &&
+           a.worldToIndex.linear == b.worldToIndex.linear;
+  };
+  for (const auto& grid : grids) {
+    require((grid == nullptr) == (grids[0] == nullptr), fmt::format("{}: three grids or none needed", name));
+    if (!grid) continue;
+    require(!grid->isPacked() && grid->table == grids[0]->table && laidOutAs(*grid, *density_) &&
+                grid->values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+            fmt::format("{}: its bricks must be laid out as the density's", name));
+    for (const Interval& range : grid->ranges)
+      require(std::isfinite(range.min) && std::isfinite(range.max),
+              fmt::format("{}: contains values that are not finite", name));
+  }
+}
+
+// Sums in a fixed order, since the mean must not depend on the threads.
+void RenderVolume::measureColour() {
+  if (!hasColour()) return;
+  double density = 0, colours[3] = {};
+  const auto sumOf = [](const BrickGrid& grid, const Vec3i& brick) {
+    const float* values = grid.brick(grid.poolIndex(brick));
+    double sum = 0;
+    for (int z = 0; z != BrickGrid::kBrick; ++z)
+      for (int y = 0; y != BrickGrid::kBrick; ++y)
+        for (int x = 0; x != BrickGrid::kBrick; ++x)
+          sum += double(std::max(values[sampleOffset(x, y, z)], 0.0f));
+    return sum;
+  };
+  for (const Vec3i& brick : occupied_) {
+    density += sumOf(*density_, brick);
+    for (std::size_t c = 0; c != 3; ++c) colours[c] += sumOf(*colour_.scattering[c], brick);
+  }
+  for (int c = 0; c != 3; ++c)
+    meanColour_[c] = density > 0 ? float(std::min(colours[c] / density, 1.0)) : 1.0f;
+}
+
+bool RenderVolume::isOccupied(std::size_t entry) const {
+  if (density_->ranges[std::size_t(density_->table[entry])].max > 0) return true;
+  for (const auto& grid : colour_.emission)
+    if (grid && grid->ranges[std::size_t(grid->table[entry])].max > 0) return true;
+  return false;
+}
+
+void RenderVolume::findOccupied() {
+  const BrickGrid& grid = *density_;
+  std::size_t entry = 0;
+  for (int z = 0; z < grid.brickCount.z; ++z)
+    for (int y = 0; y < grid.brickCount.y; ++y)
+      for (int x = 0; x < grid.brickCount.x; ++x, ++entry) {
+        const float most = grid.ranges[std::size_t(grid.table[entry])].max;
+        if (!isOccupied(entry)) continue;
+        occupied_.push_back(grid.firstBrick + Vec3i{x, y, z});
+        maxDensity_ = std::max(maxDensity_, most);
+      }
+}
+
+void RenderVolume::measureEmptiness() {
+  emptiness_.assign(density_->table.size(), kFarthest);
+  for (const Vec3i& brick : occupied_) emptiness_[density_->tableIndex(brick)] = 0;
+  spread(emptiness_, density_->brickCount);
+}
+
+void RenderVolume::measureUniformity() {
+  const BrickGrid& grid = *density_;
+  std::vector<std::size_t> places(grid.poolSize());
+  for (const std::int32_t pool : grid.table) ++places[std::size_t(pool)];
+  std::size_t constant = 0;
+  for (std::size_t pool = 0; pool != places.size(); ++pool)
+    if (grid.ranges[pool].isPoint() && grid.ranges[pool].max > 0 &&
+        (constant == 0 || places[pool] > places[constant]))
+      constant = pool;
+  uniformity_.assign(grid.table.size(), 0);
+  if (constant == 0) return;
+  for (std::size_t entry = 0; entry != grid.table.size(); ++entry)
+    if (std::size_t(grid.table[entry]) == constant) uniformity_[entry] = kFarthest;
+  spread(uniformity_, grid.brickCount);
+}
+
+void RenderVolume::measureBounds() {
+  const BrickGrid& grid = *density_;
+  constexpr int brickSize = BrickGrid::kBrick;
+  Vec3i low = occupied_.front(), high = occupied_.front();
+  for (const Vec3i& brick : occupied_) low = min(low, brick), high = max(high, brick);
+  indexBounds_ = {Vec3f(low * brickSize), Vec3f((high + Vec3i{1, 1, 1}) * brickSize)};
+
+  const auto isFull = [&](const Vec3i& brick) {
+    return grid.ranges[std::size_t(grid.poolIndex(brick))].min > 0;
+  };
+  std::vector<Vec3i> border;
+  for (const Vec3i& brick : occupied_) {
+    bool inside = true;
+    for (int axis = 0; axis != 3 && inside; ++axis)
+      for (const int side : {-1, 1}) {
+        Vec3i next = brick;
+        next[axis] += side;
+        inside = inside && isFull(next);
+      }
+    if (!inside) border.push_back(brick);
+  }
+
+  std::vector<Box> boxes(border.size());
+  parallelFor(border.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const float* values = grid.brick(grid.poolIndex(border[i]));
+      const float* glows[3] = {};
+      for (std::size_t c = 0; c != 3 && hasEmission(); ++c)
+        glows[c] = colour_.emission[c]->brick(colour_.emission[c]->poolIndex(border[i]));
+      const float* const* glow = hasEmission() ? glows : nullptr;
+      Box box;
+      for (int z = 0; z <= brickSize; ++z)
+        for (int y = 0; y <= brickSize; ++y)
+          for (int x = 0; x <= brickSize; ++x) {
+            const int at = ((z + 1) * BrickGrid::kWidth + y + 1) * BrickGrid::kWidth + x + 1;
+            if (values[at] > 0 || (glow && (glow[0][at] > 0 || glow[1][at] > 0 || glow[2][at] > 0)))
+              box = box.including(Vec3f(border[i] * brickSize + Vec3i{x, y, z}));
+          }
+      // Interpolation carries density to the voxel beyond.
+      if (!box.isEmpty()) boxes[i] = box.expanded(1.0f);
+    }
+  });
+  for (const Box& box : boxes) {
+    if (box.isEmpty()) continue;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3f p{corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                    corner & 4 ? box.max.z : box.min.z};
+      outline_.push_back(grid.indexToWorld(p));
+      worldBounds_ = worldBounds_.including(outline_.back());
+    }
+  }
+}
+
+float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
+  const Vec3f p = density_->worldToIndex(world);
+  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+  const Vec3f f = p - Vec3f(cell);
+  const auto valueOf = [&](const BrickGrid& grid) {
+    const float* at = grid.brick(grid.poolIndex(brickOf(cell))) +
+                      sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
+    float sum = 0;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3i d{corner & 1, corner >> 1 & 1, corner >> 2};
+      sum += (d.x ? f.x : 1 - f.x) * (d.y ? f.y : 1 - f.y) * (d.z ? f.z : 1 - f.z) *
+             std::max(at[(d.z * BrickGrid::kWidth + d.y) * BrickGrid::kWidth + d.x], 0.0f);
+    }
+    return sum;
+  };
+  const float density = valueOf(*density_);
+  return density > 0 && hasEmission() ? valueOf(*colour_.emission[std::size_t(colour)]) / density : 0.0f;
+}
+
+float RenderVolume::typicalDensity() const {
+  struct Sums {
+    double density = 0, squares = 0;
+  };
+  std::vector<Sums> bricks(occupied_.size());
+  parallelFor(occupied_.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const float* values = density_->brick(density_->poolIndex(occupied_[i]));
+      for (int z = 0; z != BrickGrid::kBrick; ++z)
+        for (int y = 0; y != BrickGrid::kBrick; ++y) {
+          float sum = 0, squares = 0;
+          for (int x = 0; x != BrickGrid::kBrick; ++x) {
+            const float value = std::max(values[sampleOffset(x, y, z)], 0.0f);
+            sum += value;
+            squares += value * value;
+          }
+          bricks[i].density += double(sum);
+          bricks[i].squares += double(squares);
+        }
+    }
+  });
+  // Added in a fixed order, so that the sum does not depend on the threads.
+  Sums total;
+  for (const Sums& brick : bricks) total = {total.density + brick.density, total.squares + brick.squares};
+  return total.density > 0 ? float(total.squares / total.density) : 0.0f;
+}
+
+const CodedBricks& RenderVolume::coded() const {
+  std::call_once(coded_->once, [this] { coded_->bricks = CodedBricks(*density_); });
+  return coded_->bricks;
+}
+
+std::size_t RenderVolume::memoryBytes() const {
+  std::size_t others = 0;
+  for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
+    for (const auto& grid : *grids) others += grid ? grid->memoryBytes() : 0;
+  if (field_) others += field_->memoryBytes();
+  return density_->memoryBytes() + CodedBricks::estimateBytes(*density_) + others + emptiness_.size() +
+         uniformity_.size() + occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
+}
+
+}  // namespace nephele

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/modeling/base/box.h"
+#include "nephele/render/volume/coded_bricks.h"
+
+namespace nephele {
+
+class FieldDensity;
+
+/// What a density may hold beside itself, on bricks laid out as its own: three grids of the same table, or
+/// nulls. Values below zero count as zero.
+struct VolumeColour {
+  using Grids = std::array<std::shared_ptr<const BrickGrid>, 3>;
+
+  /// Density times its colour, which multiplies the albedo and is at most 1: so that colours mix by their
+  /// share where volumes overlap, and no edge is darker because the colour ends there too.
+  Grids scattering{};
+  /// Light of its own, in Rec.709: a Medium glows with extinction * emission per world unit, whatever the
+  /// density there. So much density 1 shows where it is opaque.
+  Grids emission{};
+};
+
+/// A density that is ready to be marched: bricks, which of them hold anything, and how far it is to the next
+/// that does.
+///
+/// Densities are per world unit and multiply the extinction of a Medium. Values below zero count as zero.
+class RenderVolume {
+ public:
+  /// Keeps references to the grids. Cost: one pass over the brick tables, with a colour one over its samples.
+  /// @throws Error if a background is not 0, a value is not finite, the bricks are too many to index (1.6
+  /// million distinct ones, 8.5 GB), or colours are laid out in another way.
+  explicit RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour = {});
+
+  /// A density that rays ask a field for; `density` stands for it wherever light is worked out beforehand.
+  /// @throws Error if the grid is empty and the field is not, since then nothing would be lit; and as above.
+  static RenderVolume ofField(std::shared_ptr<const BrickGrid> density,
+                              std::shared_ptr<const FieldDensity> field);
+
+  const BrickGrid& density() const { return *density_; }
+  /// The density as the march reads it. Made at the first call, by one thread of those that ask. Cost: one
+  /// pass over the samples.
+  const CodedBricks& coded() const;
+  /// Null where the grid is all there is.
+  const FieldDensity* field() const { return field_.get(); }
+  const VolumeColour& colour() const { return colour_; }
+  bool hasColour() const { return colour_.scattering[0] != nullptr; }
+  bool hasEmission() const { return colour_.emission[0] != nullptr; }
+  /// What the albedo is multiplied by, mean over the density; 1 without a colour.
+  const Vec3f& meanColour() const { return meanColour_; }
+  /// Emission over density at a world-space point; 0 where there is no density. Slow beside a march.
+  float emissionPerDensity(const Vec3f& world, int colour) const;
+  /// True where nothing in the volume is above zero.
+  bool isEmpty() const { return occupied_.empty(); }
+  float maxDensity() const { return maxDensity_; }
+  /// Mean density weighted by itself: what light meets where it meets anything. 0 for an empty volume.
+  /// Cost: one pass over the samples.
+  float typicalDensity() const;
+
+  /// Brick coordinates of the bricks that hold density or emission, in the table's order.
+  const std::vector<Vec3i>& occupiedBricks() const { return occupied_; }
+  /// Distance in bricks (largest of the three axes) from every entry of the brick table to the nearest brick
+  /// that holds density: 0 in one, saturating at 32. A ray may leave the box of radius distance - 1 around an
+  /// entry unseen.
+  std::span<const std::uint8_t> emptiness() const { return emptiness_; }
+  /// The same distance to the nearest brick that is not the same constant, for bricks of the constant that
+  /// fills most bricks; 0 in all others. A ray may cross the box of radius distance - 1 around an entry
+  /// without looking at it.
+  std::span<const std::uint8_t> uniformity() const { return uniformity_; }
+
+  /// Box of the bricks that hold density, in voxels.
+  const Box& indexBounds() const { return indexBounds_; }
+  /// World box of the voxels above zero, grown by one voxel. Empty for an empty volume.
+  const Box& worldBounds() const { return worldBounds_; }
+  /// World-space corners of the voxels above zero, brick by brick; their hull contains all density.
+  const std::vector<Vec3f>& outline() const { return outline_; }
+  /// With `coded`, be it made or not.
+  std::size_t memoryBytes() const;
+
+ private:
+  struct Coded {
+    std::once_flag once;
+    CodedBricks bricks;
+  };
+
+  void checkColour(const VolumeColour::Grids& grids, const char* name) const;
+  void measureColour();
+  bool isOccupied(std::size_t entry) const;
+  void findOccupied();
+  void measureEmptiness();
+  void measureUniformity();
+  void measureBounds();
+
+  std::shared_ptr<const BrickGrid> density_;
+  VolumeColour colour_;
+  std::shared_ptr<Coded> coded_ = std::make_shared<Coded>();
+  std::shared_ptr<const FieldDensity> field_;
+  Vec3f meanColour_{1, 1, 1};
+  std::vector<Vec3i> occupied_;
+  std::vector<std::uint8_t> emptiness_, uniformity_;
+  std::vector<Vec3f> outline_;
+  Box indexBounds_, worldBounds_;
+  float maxDensity_ = 0.0f;
+};
+
+}  // namespace nephele

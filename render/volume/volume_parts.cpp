@@ -1,0 +1,552 @@
+// Several grids on one lattice.
+//
+// A marcher that walks one lattice is simple and fast, so grids are brought to the finest of their lattices
+// once: every brick that any of them reaches is filled with the sum of all, sample by sample. Trilinear
+// interpolation on lattices whose cells divide each other gives the same values before and after; on others
+// it errs by the square of the finest voxel. What is stored is extinction per colour, that is density times
+// colour and not the colour itself: extinctions add, colours do not, and an edge where density and colour
+// both fall to nothing keeps its colour.
+//
+// Bricks are found through the boxes of the sources' bricks, evaluated in parallel in chunks, and numbered in
+// the order of the table. Bricks of one value are stored once.
+//
+// Motion: a mean over lines through the velocity at their ends. It averages densities and not pictures, so
+// that what is opaque and moves far covers a little more than it should.
+//
+// Limits: a fine volume beside a large coarse one costs the fine voxels in both.
+#include "nephele/render/volume/volume_parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+#include "nephele/render/scene/black_body.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr int kBrick = BrickGrid::kBrick;
+constexpr int kChannels = 7;  // density, density times colour, emission
+constexpr double kLargestTable = double(1 << 28);
+constexpr float kHottest = 1e5f;
+
+// From the target's voxels to a source's, in double.
+struct IndexMap {
+  double m[3][3], t[3];
+
+  IndexMap(const BrickGrid& target, const BrickGrid& source) {
+    for (int row = 0; row != 3; ++row) {
+      t[row] = double(source.worldToIndex.translation[row]);
+      for (int k = 0; k != 3; ++k)
+        t[row] += double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.translation[k]);
+      for (int column = 0; column != 3; ++column) {
+        m[row][column] = 0;
+        for (int k = 0; k != 3; ++k)
+          m[row][column] +=
+              double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.linear(k, column));
+      }
+    }
+    snap();
+  }
+
+  Vec3d operator()(const Vec3d& p) const {
+    Vec3d r;
+    for (int row = 0; row != 3; ++row) r[row] = m[row][0] * p.x + m[row][1] * p.y + m[row][2] * p.z + t[row];
+    return r;
+  }
+
+  // The box of a box.
+  void mapped(const Vec3d& low, const Vec3d& high, Vec3d& outLow, Vec3d& outHigh) const {
+    const Vec3d middle = (*this)((low + high) * 0.5), half = (high - low) * 0.5;
+    for (int row = 0; row != 3; ++row) {
+      const double reach =
+          std::fabs(m[row][0]) * half.x + std::fabs(m[row][1]) * half.y + std::fabs(m[row][2]) * half.z;
+      outLow[row] = middle[row] - reach;
+      outHigh[row] = middle[row] + reach;
+    }
+  }
+
+  // Whether voxels coincide, and by how many they are shifted.
+  bool isShift = false;
+  Vec3i shift{};
+
+ private:
+  // Takes the rounding of maps for what it is.
+  void snap() {
+    constexpr double tolerance = 1e-5;
+    for (auto& row : m)
+      for (double& value : row)
+        if (std::fabs(value - std::round(value)) < tolerance) value = std::round(value);
+    for (double& value : t)
+      if (std::fabs(value - std::round(value)) < 1e-3) value = std::round(value);
+    isShift = true;
+    for (int row = 0; row != 3; ++row) {
+      for (int column = 0; column != 3; ++column) isShift = isShift && m[row][column] == (row == column);
+      isShift = isShift && t[row] == std::round(t[row]) && std::fabs(t[row]) < 1e8;
+      if (isShift) shift[row] = int(t[row]);
+    }
+  }
+};
+
+// A source grid as the target's voxels see it.
+class Source {
+ public:
+  Source(const BrickGrid& target, const BrickGrid& grid)
+      : grid_(grid), toSource_(target, grid), toTarget_(grid, target) {}
+
+  float at(const Vec3i& voxel) const {
+    if (toSource_.isShift) return sample(voxel + toSource_.shift);
+    return at(Vec3d(Vec3f(voxel)));
+  }
+
+  // Between the target's voxels.
+  float at(const Vec3d& place) const {
+    const Vec3d p = toSource_(place);
+    if (!(std::fabs(p.x) < 1e8 && std::fabs(p.y) < 1e8 && std::fabs(p.z) < 1e8)) return grid_.background;
+    const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+    const Vec3f f{float(p.x - cell.x), float(p.y - cell.y), float(p.z - cell.z)};
+    const Vec3i brick = brickOf(cell);
+    const std::int32_t pool = grid_.poolIndex(brick);
+    if (grid_.ranges[std::size_t(pool)].isPoint()) return grid_.ranges[std::size_t(pool)].min;
+    const float* v =
+        grid_.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
+    constexpr int row = BrickGrid::kWidth, plane = row * row;
+    const auto edge = [&](int offset) { return v[offset] + f.x * (v[offset + 1] - v[offset]); };
+    const auto face = [&](int offset) { return edge(offset) + f.y * (edge(offset + row) - edge(offset)); };
+    return face(0) + f.z * (face(plane) - face(0));
+  }
+
+  // Whether any value above zero lies in the source's bricks around the voxels low .. high, or may come there
+  // by moving.
+  bool reaches(const Vec3i& low, const Vec3i& high, const Vec3d& motion) const {
+    Vec3d a, b;
+    toSource_.mapped(Vec3d(Vec3f(low)) - motion, Vec3d(Vec3f(high)) + motion, a, b);
+    Vec3i first, last;
+    for (int axis = 0; axis != 3; ++axis) {
+      const double lowest = grid_.firstBrick[axis], highest = lowest + grid_.brickCount[axis] - 1;
+      first[axis] = int(std::clamp(std::floor((a[axis] - 0.001) / kBrick), lowest, highest + 1));
+      last[axis] = int(std::clamp(std::floor((b[axis] + 0.001) / kBrick), lowest - 1, highest));
+    }
+    for (int z = first.z; z <= last.z; ++z)
+      for (int y = first.y; y <= last.y; ++y)
+        for (int x = first.x; x <= last.x; ++x)
+          if (grid_.ranges[std::size_t(grid_.poolIndex({x, y, z}))].max > 0) return true;
+    return false;
+  }
+
+  // Calls visit(first, last) with the target's bricks that values above zero may reach, source brick by
+  // source brick.
+  template <class Visit>
+  void visitBricks(const Vec3d& motion, Visit&& visit) const {
+    std::size_t entry = 0;
+    for (int z = 0; z != grid_.brickCount.z; ++z)
+      for (int y = 0; y != grid_.brickCount.y; ++y)
+        for (int x = 0; x != grid_.brickCount.x; ++x, ++entry) {
+          if (!(grid_.ranges[std::size_t(grid_.table[entry])].max > 0)) continue;
+          const Vec3f low((grid_.firstBrick + Vec3i{x, y, z}) * kBrick);
+          Vec3d a, b;
+          toTarget_.mapped(Vec3d(low), Vec3d(low + Vec3f{kBrick, kBrick, kBrick}), a, b);
+          Vec3i first, last;
+          for (int axis = 0; axis != 3; ++axis) {
+            first[axis] = int(std::floor(std::clamp((a[axis] - motion[axis] - 1) / kBrick, -1e8, 1e8)));
+            last[axis] = int(std::floor(std::clamp((b[axis] + motion[axis] + 1) / kBrick, -1e8, 1e8)));
+          }
+          visit(first, last);
+        }
+  }
+
+ private:
+  float sample(const Vec3i& voxel) const {
+    return grid_.brick(grid_.poolIndex(
+        brickOf(voxel)))[sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z))];
+  }
+
+  const BrickGrid& grid_;
+  IndexMap toSource_, toTarget_;
+};
+
+struct PartSources {
+  const VolumePart* part;
+  std::optional<Source> density, temperature;
+  std::vector<Source> colour, emission, velocity;
+  // Farthest way of anything from where the grids have it, in voxels of the target.
+  Vec3d motion{};
+};
+
+void checkGrid(const BrickGrid& grid, const char* name, bool needsZero) {
+  require(!grid.isPacked(), fmt::format("{}: must not be packed", name));
+  require(
+      !needsZero || grid.background == 0.0f,
+      fmt::format("{}: expected 0 outside of the volume, but its background is {}", name, grid.background));
+  for (const Interval& range : grid.ranges)
+    require(std::isfinite(range.min) && std::isfinite(range.max),
+            fmt::format("{}: contains values that are not finite", name));
+}
+
+void checkThree(const VolumePart::Grids& grids, const char* name, bool needsZero) {
+  for (const auto& grid : grids) {
+    require((grid == nullptr) == (grids[0] == nullptr), fmt::format("{}: three grids or none needed", name));
+    if (grid) checkGrid(*grid, name, needsZero);
+  }
+}
+
+float largest(const BrickGrid& grid) {
+  float most = 0;
+  for (const Interval& range : grid.ranges) most = std::max(most, range.max);
+  return most;
+}
+
+// The grid whose voxels all are brought to. Which one does not depend on the order of the parts.
+const BrickGrid& finest(const std::vector<VolumePart>& parts) {
+  const BrickGrid* best = nullptr;
+  const auto key = [](const BrickGrid& grid) {
+    const Mat3f& m = grid.indexToWorld.linear;
+    const Vec3f& t = grid.indexToWorld.translation;
+    return std::tuple(grid.voxelSize, m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1),
+                      m(2, 2), t.x, t.y, t.z);
+  };
+  const auto consider = [&](const std::shared_ptr<const BrickGrid>& grid) {
+    if (grid && (!best || key(*grid) < key(*best))) best = grid.get();
+  };
+  for (const VolumePart& part : parts) {
+    consider(part.density);
+    if (part.density) continue;
+    consider(part.emission[0]);
+    consider(part.temperature);
+  }
+  return *best;
+}
+
+// Colours of black bodies between 0 K and the hottest of a part.
+class Incandescence {
+ public:
+  explicit Incandescence(float hottest) : perKelvin_(float(kSteps) / std::max(hottest, 1.0f)) {
+    if (hottest <= 0) {
+      table_.resize(kSteps + 2);
+      return;
+    }
+    for (int i = 0; i <= kSteps + 1; ++i) table_.push_back(blackBody(double(i) / double(perKelvin_)));
+  }
+  Vec3f operator()(float kelvin) const {
+    const float x = std::clamp(kelvin * perKelvin_, 0.0f, float(kSteps));
+    const int i = int(x);
+    return table_[std::size_t(i)] + (table_[std::size_t(i + 1)] - table_[std::size_t(i)]) * (x - float(i));
+  }
+
+ private:
+  static constexpr int kSteps = 4096;
+  float perKelvin_;
+  std::vector<Vec3f> table_;
+};
+
+class Combiner {
+ public:
+  explicit Combiner(const std::vector<VolumePart>& parts) : lattice_(finest(parts)) {
+    for (const VolumePart& part : parts) {
+      PartSources& sources = sources_.emplace_back();
+      sources.part = &part;
+      if (part.density) sources.density.emplace(lattice_, *part.density);
+      for (const auto& grid : part.colour)
+        if (grid) sources.colour.emplace_back(lattice_, *grid);
+      for (const auto& grid : part.emission)
+        if (grid) sources.emission.emplace_back(lattice_, *grid);
+      for (const auto& grid : part.velocity)
+        if (grid) sources.velocity.emplace_back(lattice_, *grid);
+      sources.motion = farthest(part);
+      if (part.temperature) {
+        sources.temperature.emplace(lattice_, *part.temperature);
+        incandescence_.emplace_back(largest(*part.temperature) * part.temperatureScale);
+      } else {
+        incandescence_.emplace_back(0.0f);
+      }
+      hasColour_ = hasColour_ || part.colour[0] || part.albedo != Vec3f{1, 1, 1};
+      hasEmission_ = hasEmission_ || part.emission[0] || part.temperature;
+    }
+    channels_[0] = true;
+    for (int c = 1; c != 4; ++c) channels_[c] = hasColour_, channels_[c + 3] = hasEmission_;
+  }
+
+  std::vector<Vec3i> reachedBricks();
+  RenderVolume combined(const Progress& progress);
+  double estimateBytes() {
+    double grids = 0;
+    for (const bool used : channels_) grids += used;
+    return grids * (double(reachedBricks().size() + 1) * BrickGrid::kVolume * sizeof(float) +
+                    double(count_.x) * count_.y * count_.z * sizeof(std::int32_t));
+  }
+
+ private:
+  using Samples = std::array<std::vector<float>, kChannels>;
+
+  template <class Visit>
+  void forEachCarrier(Visit&& visit) const {
+    for (const PartSources& sources : sources_) {
+      if (sources.density && sources.part->share > 0) visit(*sources.density, sources.motion);
+      for (const Source& source : sources.emission) visit(source, sources.motion);
+      if (sources.temperature) visit(*sources.temperature, sources.motion);
+    }
+  }
+  void evaluate(const Vec3i& brick, float* const (&out)[kChannels]) const;
+  static constexpr int kMostTimes = 64;
+  Vec3d farthest(const VolumePart& part) const;
+  template <class Place>
+  void add(const PartSources& sources, const Incandescence& incandescence, const Place& voxel,
+           float (&values)[kChannels]) const;
+  void addMoving(const PartSources& sources, const Incandescence& incandescence, const Vec3i& voxel,
+                 float (&values)[kChannels]) const;
+
+  const BrickGrid& lattice_;
+  std::vector<PartSources> sources_;
+  std::vector<Incandescence> incandescence_;
+  bool hasColour_ = false, hasEmission_ = false;
+  bool channels_[kChannels] = {};
+  Vec3i first_{}, count_{};
+};
+
+Vec3d Combiner::farthest(const VolumePart& part) const {
+  Vec3d fastest{}, result{};
+  for (std::size_t c = 0; c != 3 && part.velocity[0]; ++c)
+    for (const Interval& range : part.velocity[c]->ranges)
+      fastest[int(c)] = std::max(fastest[int(c)], double(range.magnitude()));
+  const double time = std::max(std::fabs(part.shutter.open), std::fabs(part.shutter.close));
+  for (int row = 0; row != 3; ++row)
+    for (int c = 0; c != 3; ++c)
+      result[row] += std::fabs(double(lattice_.worldToIndex.linear(row, c))) * fastest[c] * time;
+  return result;
+}
+
+std::vector<Vec3i> Combiner::reachedBricks() {
+  Vec3i low{1 << 30, 1 << 30, 1 << 30}, high = -low;
+  forEachCarrier([&](const Source& source, const Vec3d& motion) {
+    source.visitBricks(motion, [&](const Vec3i& first, const Vec3i& last) {
+      low = min(low, first);
+      high = max(high, last);
+    });
+  });
+  if (low.x > high.x) return {};
+  const Vec3d size = Vec3d(Vec3f(high)) - Vec3d(Vec3f(low)) + Vec3d{1, 1, 1};
+  require(
+      size.x * size.y * size.z <= kLargestTable,
+      fmt::format("volumes: together they span {:g} x {:g} x {:g} voxels of the finest of them, more than "
+                  "can be held; use fewer or larger voxels",
+                  size.x * kBrick, size.y * kBrick, size.z * kBrick));
+  first_ = low;
+  count_ = high - low + Vec3i{1, 1, 1};
+  std::vector<std::uint8_t> reached(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z));
+  forEachCarrier([&](const Source& source, const Vec3d& motion) {
+    source.visitBricks(motion, [&](const Vec3i& first, const Vec3i& last) {
+      for (int z = first.z; z <= last.z; ++z)
+        for (int y = first.y; y <= last.y; ++y)
+          for (int x = first.x; x <= last.x; ++x) {
+            const Vec3i b = Vec3i{x, y, z} - low;
+            reached[(std::size_t(b.z) * std::size_t(count_.y) + std::size_t(b.y)) * std::size_t(count_.x) +
+                    std::size_t(b.x)] = 1;
+          }
+    });
+  });
+  std::vector<Vec3i> bricks;
+  std::size_t entry = 0;
+  for (int z = 0; z != count_.z; ++z)
+    for (int y = 0; y != count_.y; ++y)
+      for (int x = 0; x != count_.x; ++x)
+        if (reached[entry++]) bricks.push_back(low + Vec3i{x, y, z});
+  return bricks;
+}
+
+void Combiner::addMoving(const PartSources& sources, const Incandescence& incandescence, const Vec3i& voxel,
+                         float (&values)[kChannels]) const {
+  const Shutter& shutter = sources.part->shutter;
+  Vec3d world{};
+  for (int c = 0; c != 3; ++c) world[c] = double(sources.velocity[std::size_t(c)].at(voxel));
+  Vec3d velocity{};
+  for (int row = 0; row != 3; ++row)
+    for (int c = 0; c != 3; ++c) velocity[row] += double(lattice_.worldToIndex.linear(row, c)) * world[c];
+  const double open = shutter.close - shutter.open, way = length(velocity) * open;
+  const int count = int(std::clamp(std::ceil(way), 1.0, double(kMostTimes)));
+  float sum[kChannels] = {};
+  for (int i = 0; i != count; ++i) {
+    const double time = shutter.open + open * (i + 0.5) / count;
+    add(sources, incandescence, Vec3d(Vec3f(voxel)) - velocity * time, sum);
+  }
+  for (int c = 0; c != kChannels; ++c) values[c] += sum[c] / float(count);
+}
+
+template <class Place>
+void Combiner::add(const PartSources& sources, const Incandescence& incandescence, const Place& voxel,
+                   float (&values)[kChannels]) const {
+  const VolumePart& part = *sources.part;
+  if (sources.density) {
+    const float density = part.share * std::max(sources.density->at(voxel), 0.0f);
+    values[0] += density;
+    if (hasColour_ && density > 0)
+      for (int c = 0; c != 3; ++c) {
+        const float colour =
+            sources.colour.empty() ? 1.0f : std::clamp(sources.colour[std::size_t(c)].at(voxel), 0.0f, 1.0f);
+        values[1 + c] += density * part.albedo[c] * colour;
+      }
+  }
+  for (std::size_t c = 0; c != sources.emission.size(); ++c)
+    values[4 + c] += part.emissionScale * std::max(sources.emission[c].at(voxel), 0.0f);
+  if (sources.temperature) {
+    const Vec3f glow = incandescence(part.temperatureScale * sources.temperature->at(voxel));
+    for (int c = 0; c != 3; ++c) values[4 + c] += part.emissionScale * glow[c];
+  }
+}
+
+void Combiner::evaluate(const Vec3i& brick, float* const (&out)[kChannels]) const {
+  const Vec3i low = brick * kBrick - Vec3i{1, 1, 1}, high = brick * kBrick + Vec3i{9, 9, 9};
+  std::vector<std::size_t> here;
+  for (std::size_t i = 0; i != sources_.size(); ++i) {
+    bool reaches = sources_[i].density && sources_[i].density->reaches(low, high, sources_[i].motion);
+    for (const Source& source : sources_[i].emission)
+      reaches = reaches || source.reaches(low, high, sources_[i].motion);
+    reaches = reaches ||
+              (sources_[i].temperature && sources_[i].temperature->reaches(low, high, sources_[i].motion));
+    if (reaches) here.push_back(i);
+  }
+  std::size_t at = 0;
+  for (int z = low.z; z <= high.z; ++z)
+    for (int y = low.y; y <= high.y; ++y)
+      for (int x = low.x; x <= high.x; ++x, ++at) {
+        float values[kChannels] = {};
+        for (const std::size_t i : here)
+          if (sources_[i].velocity.empty())
+            add(sources_[i], incandescence_[i], Vec3i{x, y, z}, values);
+          else
+            addMoving(sources_[i], incandescence_[i], {x, y, z}, values);
+        for (int c = 0; c != kChannels; ++c)
+          if (out[c]) out[c][at] = values[c];
+      }
+}
+
+RenderVolume Combiner::combined(const Progress& progress) {
+  progress.begin("combine");
+  const std::vector<Vec3i> bricks = reachedBricks();
+  std::array<std::shared_ptr<BrickGrid>, kChannels> grids;
+  for (int c = 0; c != kChannels; ++c) {
+    if (!channels_[c]) continue;
+    grids[c] = std::make_shared<BrickGrid>();
+    grids[c]->indexToWorld = lattice_.indexToWorld;
+    grids[c]->worldToIndex = lattice_.worldToIndex;
+    grids[c]->voxelSize = lattice_.voxelSize;
+    grids[c]->firstBrick = first_;
+    grids[c]->brickCount = count_;
+    grids[c]->values.assign(BrickGrid::kVolume, 0.0f);
+    grids[c]->ranges.assign(1, Interval::of(0));
+  }
+  std::vector<std::int32_t> table(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z), 0);
+  std::map<std::array<float, kChannels>, std::int32_t> constants{{{}, 0}};
+
+  constexpr std::size_t chunk = 2048, volume = BrickGrid::kVolume;
+  Samples samples;
+  std::array<std::vector<Interval>, kChannels> ranges;
+  for (int c = 0; c != kChannels; ++c)
+    if (grids[c]) samples[c].resize(chunk * volume), ranges[c].resize(chunk);
+  for (std::size_t begin = 0; begin < bricks.size(); begin += chunk) {
+    progress.check();
+    const std::size_t count = std::min(chunk, bricks.size() - begin);
+    parallelFor(count, 8, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i != last; ++i) {
+        float* out[kChannels];
+        for (int c = 0; c != kChannels; ++c) out[c] = grids[c] ? samples[c].data() + i * volume : nullptr;
+        evaluate(bricks[begin + i], out);
+        for (int c = 0; c != kChannels; ++c)
+          if (out[c]) ranges[c][i] = rangeOfBrick(out[c]);
+      }
+    });
+    for (std::size_t i = 0; i != count; ++i) {
+      std::array<float, kChannels> constant{};
+      bool isConstant = true;
+      for (int c = 0; c != kChannels; ++c) {
+        if (!grids[c]) continue;
+        isConstant = isConstant && ranges[c][i].isPoint();
+        constant[c] = ranges[c][i].min;
+      }
+      const Vec3i b = bricks[begin + i] - first_;
+      std::int32_t& entry =
+          table[(std::size_t(b.z) * std::size_t(count_.y) + std::size_t(b.y)) * std::size_t(count_.x) +
+                std::size_t(b.x)];
+      entry = std::int32_t(grids[0]->ranges.size());
+      if (isConstant) {
+        const auto [known, isNew] = constants.try_emplace(constant, entry);
+        entry = known->second;
+        if (!isNew) continue;
+      }
+      for (int c = 0; c != kChannels; ++c) {
+        if (!grids[c]) continue;
+        const float* from = samples[c].data() + i * volume;
+        grids[c]->values.insert(grids[c]->values.end(), from, from + volume);
+        grids[c]->ranges.push_back(ranges[c][i]);
+      }
+    }
+    progress.advance(double(begin + count) / double(bricks.size()));
+  }
+  VolumeColour colour;
+  for (int c = 0; c != kChannels; ++c)
+    if (grids[c]) grids[c]->table = table;
+  for (std::size_t c = 0; c != 3; ++c) {
+    colour.scattering[c] = grids[1 + c];
+    colour.emission[c] = grids[4 + c];
+  }
+  return RenderVolume(grids[0], colour);
+}
+
+bool isPlain(const std::vector<VolumePart>& parts) {
+  return parts.size() == 1 && parts[0].density && parts[0].share == 1 && parts[0].albedo == Vec3f{1, 1, 1} &&
+         !parts[0].colour[0] && !parts[0].emission[0] && !parts[0].temperature && !parts[0].velocity[0];
+}
+
+}  // namespace
+
+void check(const VolumePart& part) {
+  require(part.density || part.emission[0] || part.temperature,
+          "volumes: one of them has neither density nor emission");
+  if (part.density) checkGrid(*part.density, "density", true);
+  checkThree(part.colour, "colour", false);
+  checkThree(part.emission, "emission", true);
+  require(std::isfinite(part.share) && part.share >= 0,
+          fmt::format("share: expected a finite number >= 0, got {}", part.share));
+  require(std::isfinite(part.emissionScale) && part.emissionScale >= 0,
+          fmt::format("emission scale: expected a finite number >= 0, got {}", part.emissionScale));
+  for (int c = 0; c != 3; ++c)
+    require(part.albedo[c] >= 0 && part.albedo[c] <= 1,
+            fmt::format("albedo: expected three numbers within [0, 1], got {}", part.albedo[c]));
+  checkThree(part.velocity, "velocity", false);
+  require(std::isfinite(part.shutter.open) && std::isfinite(part.shutter.close) &&
+              part.shutter.open <= part.shutter.close,
+          fmt::format("shutter: expected an opening not after the closing, got {}, {}", part.shutter.open,
+                      part.shutter.close));
+  if (!part.temperature) return;
+  checkGrid(*part.temperature, "temperature", true);
+  require(std::isfinite(part.temperatureScale) && part.temperatureScale > 0,
+          fmt::format("temperature scale: expected a finite number > 0, got {}", part.temperatureScale));
+  const float hottest = largest(*part.temperature);
+  require(hottest * part.temperatureScale <= kHottest,
+          fmt::format("temperature: {:g} times {:g} is more than {:g} K; give a smaller temperature scale, 1 "
+                      "if the grid holds kelvins",
+                      hottest, part.temperatureScale, kHottest));
+}
+
+RenderVolume combine(const std::vector<VolumePart>& parts, const Progress& progress) {
+  require(!parts.empty(), "volumes: at least one is needed");
+  for (const VolumePart& part : parts) check(part);
+  if (isPlain(parts)) return RenderVolume(parts[0].density);
+  return Combiner(parts).combined(progress);
+}
+
+double estimateCombinedBytes(const std::vector<VolumePart>& parts) {
+  if (parts.empty() || isPlain(parts)) return 0;
+  for (const VolumePart& part : parts) check(part);
+  return Combiner(parts).estimateBytes();
+}
+
+}  // namespace nephele

@@ -1,0 +1,514 @@
+#include "nephele/levelset/cut/level_set_pieces.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/shape/shapes.h"
+#include "tests/support/brick_grids.h"
+#include "tests/support/mesh_topology.h"
+#include "tests/support/piece_checks.h"
+#include "tests/support/test_data.h"
+
+namespace nephele::test {
+namespace {
+
+constexpr Box kBall{{-1, -1, -1}, {1, 1, 1}};
+
+/// The ball of radius 1 with so many voxels along it.
+std::shared_ptr<BrickGrid> ball(int voxelsPerRadius) {
+  const float h = 1.0f / float(voxelsPerRadius);
+  return bakeGrid(sphere({0, 0, 0}, 1),
+                  {.voxelSize = h, .box = kBall.expanded(4 * h), .band = {-4 * h, 4 * h}});
+}
+
+/// Small lattices of random samples, many of them 0 and next to each other.
+std::shared_ptr<BrickGrid> randomLattice(std::uint32_t seed, int side) {
+  std::mt19937 random(seed);
+  const std::uint32_t kind = seed % 4;
+  std::vector<float> values(std::size_t(side * side * side));
+  for (float& v : values)
+    v = kind == 0   ? float(random() % 3) - 1
+        : kind == 1 ? float(random() % 2001) / 1000.0f - 1
+        : kind == 2 ? (random() % 3 != 0 ? 1.0f : 0.0f)
+                    : (float(random() % 5) - 2) / 2;
+  return denseGrid(
+      {-1, 0, 0}, {2, 2, 1},
+      [&](const Vec3i& v) {
+        const Vec3i at = v - Vec3i{-2, 5, 1};
+        const bool isIn = std::min({at.x, at.y, at.z}) >= 0 && std::max({at.x, at.y, at.z}) < side;
+        return isIn ? values[std::size_t((at.z * side + at.y) * side + at.x)] : -1.0f;
+      },
+      {}, -1.0f);
+}
+
+/// How far a point is from the nearest of some planes.
+double toPlanes(const Vec3d& p, const std::vector<BladePlane>& planes) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const BladePlane& plane : planes)
+    least = std::min(least, std::abs(dot(p - Vec3d(plane.point), normalize(Vec3d(plane.normal)))));
+  return least;
+}
+
+TEST(MarchingTetrahedra, AreClosedManifoldsOnAnySamples) {
+  for (std::uint32_t seed = 0; seed < 400; ++seed) {
+    const Mesh mesh = marchingTetrahedra(*randomLattice(seed, 3 + int(seed / 4 % 4)));
+    if (mesh.faceCount() == 0) continue;
+    const Topology topology = topologyOf(mesh);
+    ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
+    ASSERT_GT(signedVolume(mesh), 0) << seed;
+  }
+}
+
+TEST(MarchingTetrahedra, DoNotCrossThemselves) {
+  for (std::uint32_t seed = 0; seed < 12; ++seed)
+    EXPECT_EQ(countSelfIntersections(marchingTetrahedra(*randomLattice(seed, 5))), 0u) << seed;
+}
+
+TEST(MarchingTetrahedra, OfABallGainTheFourthOfTheErrorAtHalfTheVoxel) {
+  const double exact = 4 * M_PI / 3;
+  const double coarse = signedVolume(marchingTetrahedra(*ball(10))) / exact - 1;
+  const double fine = signedVolume(marchingTetrahedra(*ball(20))) / exact - 1;
+  EXPECT_LT(std::abs(fine), 0.005);
+  EXPECT_NEAR(coarse / fine, 4, 0.4);  // linear in cells: second order
+}
+
+TEST(MarchingTetrahedra, PassThroughSamplesOfZero) {
+  // A cube whose faces are samples: these become vertices, with no slivers beside them.
+  const auto cube = denseGrid(
+      {-1, -1, -1}, {2, 2, 2},
+      [](const Vec3i& v) {
+        return 5.0f - float(std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
+      },
+      {}, -1.0f);
+  const Mesh mesh = marchingTetrahedra(*cube);
+  EXPECT_TRUE(topologyOf(mesh).isClosedManifold()) << topologyOf(mesh);
+  // 602 samples on the surface of 10 x 10 x 10 cells, but six of its edges, 9 samples each, and six corners
+  // have no edge of a tetrahedron that leads inside.
+  EXPECT_EQ(mesh.positions.size(), 602u - 6u * 9u - 6u);
+  for (const Vec3d& p : mesh.positions) {
+    EXPECT_EQ(p, Vec3d(std::round(p.x), std::round(p.y), std::round(p.z)));
+    EXPECT_EQ(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}), 5);
+  }
+}
+
+TEST(MarchingTetrahedra, StandWhereTheMapOfTheGridPutsThem) {
+  // Turned, stretched and mirrored.
+  Affine map;
+  map.linear.m = {0, 0.5f, 0, 0.25f, 0, 0, 0, 0, 2};
+  map.translation = {10, 20, 30};
+  const auto value = [](const Vec3i& v) { return 5.3f - length(Vec3f(v)); };
+  const Mesh plain = marchingTetrahedra(*denseGrid({-1, -1, -1}, {2, 2, 2}, value, {}, -1.0f));
+  const Mesh mapped = marchingTetrahedra(*denseGrid({-1, -1, -1}, {2, 2, 2}, value, map, -1.0f));
+  EXPECT_TRUE(topologyOf(mapped).isClosedManifold());
+  EXPECT_NEAR(signedVolume(mapped) / signedVolume(plain), 0.25, 1e-9);
+  EXPECT_NEAR(length(Vec3d(boundingBox(mapped).center()) - Vec3d{10, 20, 30}), 0, 1e-4);
+}
+
+TEST(MarchingTetrahedra, RefuseWhatHasNoSurface) {
+  EXPECT_THROW(marchingTetrahedra(*denseGrid(
+                   {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return 1; }, {}, 1.0f)),
+               Error);
+  EXPECT_THROW(
+      marchingTetrahedra(*denseGrid(
+          {0, 0, 0}, {1, 1, 1},
+          [](const Vec3i& v) { return v.x == 3 ? std::numeric_limits<float>::quiet_NaN() : float(4 - v.y); },
+          {}, -1.0f)),
+      Error);
+  const auto outside = denseGrid(
+      {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return -1; }, {}, -1.0f);
+  EXPECT_EQ(marchingTetrahedra(*outside).faceCount(), 0u);
+  EXPECT_THROW(cutLevelSet(*outside, {}), Error);
+}
+
+TEST(LevelSetPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
+  const auto level = ball(32);
+  const Mesh whole = marchingTetrahedra(*level);
+  for (const int n : {1, 3, 5, 8}) {
+    const auto blades = randomBlades({.count = n, .box = kBall, .throughCentre = true});
+    const MeshPieces cut = cutLevelSet(*level, {.planes = blades});
+    EXPECT_EQ(cut.pieces.size(), std::size_t(n * n - n + 2));
+    expectSound(whole, cut);
+    EXPECT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 1e-10);
+  }
+}
+
+TEST(LevelSetPieces, CutFacesLieOnTheirKnivesAndOuterOnesOnTheLevelSet) {
+  const auto level = ball(40);
+  const double h = double(level->voxelSize);
+  const auto blades = randomBlades({.count = 5, .box = kBall, .seed = 1});
+  for (const MeshPiece& piece : cutLevelSet(*level, {.planes = blades}).pieces) {
+    for (std::size_t f = 0; f < piece.mesh.faceCount(); ++f)
+      for (const std::uint32_t v : piece.mesh.face(f)) {
+        const Vec3d& p = piece.mesh.positions[v];
+        if (f >= firstInside(piece.mesh)) {
+          EXPECT_LT(toPlanes(p, blades), 1e-3 * h);
+        } else {
+          EXPECT_NEAR(length(p), 1, 0.01 * h);
+        }
+      }
+  }
+}
+
+TEST(LevelSetPieces, APlaneThroughSamplesHalvesABall) {
+  const auto level = ball(25);
+  const Mesh whole = marchingTetrahedra(*level);
+  const MeshPieces cut = cutLevelSet(*level, {.planes = {{{0, 0, 0}, {1, 0, 0}}}});
+  expectSound(whole, cut);
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  for (const MeshPiece& piece : cut.pieces) {
+    // The tetrahedra are symmetric about the centre.
+    EXPECT_NEAR(piece.mass.volume, signedVolume(whole) / 2, 1e-7);
+    EXPECT_NEAR(piece.mass.volume, 2 * M_PI / 3, 0.01);
+    EXPECT_NEAR(insideArea(piece.mesh), M_PI, 0.01);
+  }
+  // The same plane as any other field: made of triangles of the lattice, in the same place.
+  const MeshPieces field = cutLevelSet(*level, {.knives = {flatKnife({{0, 0, 0}, {1, 0, 0}})}});
+  ASSERT_EQ(field.pieces.size(), 2u);
+  expectSound(whole, field);
+  for (const MeshPiece& piece : field.pieces) EXPECT_NEAR(piece.mass.volume, signedVolume(whole) / 2, 1e-7);
+}
+
+TEST(LevelSetPieces, AKnifeThatMissesLeavesOnePiece) {
+  const auto level = ball(16);
+  const MeshPieces cut =
+      cutLevelSet(*level, {.planes = {{{0, 3, 0}, {0, 1, 0}}}, .knives = {Knife(sphere({5, 0, 0}, 1))}});
+  ASSERT_EQ(cut.pieces.size(), 1u);
+  EXPECT_EQ(cut.pieces[0].code.sides, (std::vector<bool>{false, false}));
+  EXPECT_NEAR(cut.pieces[0].mass.volume, signedVolume(marchingTetrahedra(*level)), 1e-11);
+}
+
+TEST(LevelSetPieces, KnivesThatCoincideCutOnce) {
+  const auto level = ball(16);
+  const BladePlane plane{{0.1f, 0, 0}, {1, 0.3f, 0}};
+  const RoughBlade rough{plane, {.amplitude = 0.05f, .noise = {.frequency = 2}}};
+  const Knife tool(sphere({0, 1, 0}, 0.7f));
+  for (const LevelSetCutOptions& options :
+       {LevelSetCutOptions{.planes = {plane, plane}}, LevelSetCutOptions{.rough = {rough, rough}},
+        LevelSetCutOptions{.knives = {tool, tool}}}) {
+    const MeshPieces cut = cutLevelSet(*level, options);
+    ASSERT_EQ(cut.pieces.size(), 2u);
+    EXPECT_EQ(cut.slivers, 0u);
+    for (const MeshPiece& piece : cut.pieces) EXPECT_EQ(piece.code.sides[0], piece.code.sides[1]);
+    expectSound(marchingTetrahedra(*level), cut);
+  }
+}
+
+TEST(LevelSetPieces, AKnifeMayCoincideWithTheSurface) {
+  // Refused by cutMesh, which has to bring two meshes together.
+  const auto level = ball(16);
+  for (const MeshPieces& cut : {cutLevelSet(*level, {.knives = {gridField(level)}}),
+                                cutLevelSet(*level, {.knives = {Knife(sphere({0, 0, 0}, 1))}})}) {
+    ASSERT_EQ(cut.pieces.size(), 1u);
+    EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{true});
+    EXPECT_NEAR(cut.pieces[0].mass.volume, signedVolume(marchingTetrahedra(*level)), 1e-6);
+  }
+}
+
+TEST(LevelSetPieces, ABallCutsOutALens) {
+  const auto level = ball(40);
+  const MeshPieces cut = cutLevelSet(*level, {.knives = {Knife(sphere({1, 0, 0}, 1))}});
+  expectSound(marchingTetrahedra(*level), cut);
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  const MeshPiece& lens = cut.pieces[1];
+  EXPECT_EQ(lens.code.sides, std::vector<bool>{true});
+  EXPECT_NEAR(lens.mass.volume, 5 * M_PI / 12, 0.002 * 5 * M_PI / 12);  // two caps of height 1/2
+  EXPECT_NEAR(lens.neighbours[0].area, M_PI, 0.005 * M_PI);             // a cap: 2 pi r h
+  // 3 / 8 of a voxel squared over the radius, and the margin beside samples; off the rim nearly nothing
+  // (ALGORITHMS 4: 1e-3).
+  std::size_t offRim = 0;
+  for (std::size_t f = firstInside(lens.mesh); f < lens.mesh.faceCount(); ++f)
+    for (const std::uint32_t v : lens.mesh.face(f)) {
+      const Vec3d q = lens.mesh.positions[v] / double(level->voxelSize);
+      const bool isOffRim = length(q) < 40 - 2;
+      offRim += isOffRim;
+      EXPECT_NEAR(length(q - Vec3d{40, 0, 0}), 40, isOffRim ? 1e-3 : 0.01);
+    }
+  EXPECT_GT(offRim, 20000u);
+}
+
+/// How far vertices of inner faces, off the outer surface of the ball, lie from a blade with a kerf, voxels.
+double farthestFromBlade(const MeshPieces& cut, const Knife& knife, float kerf, double voxel) {
+  double worst = 0;
+  for (const MeshPiece& piece : cut.pieces) {
+    std::array<std::vector<float>, 3> points, slopes;
+    for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f)
+      for (const std::uint32_t v : piece.mesh.face(f))
+        if (const Vec3d& p = piece.mesh.positions[v]; length(p) < 1 - 3 * voxel)
+          for (int axis = 0; axis < 3; ++axis) points[std::size_t(axis)].push_back(float(p[axis]));
+    EXPECT_GT(points[0].size(), 3000u);
+    std::vector<float> values(points[0].size());
+    for (auto& lane : slopes) lane.resize(values.size());
+    knife.field.evalGrad({points[0], points[1], points[2]}, values, {{slopes[0], slopes[1], slopes[2]}});
+    const double side = piece.code.sides[0] ? 0.5 : -0.5;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double slope = double(length(Vec3f{slopes[0][i], slopes[1][i], slopes[2][i]}));
+      worst = std::max(worst, std::abs(double(values[i]) / slope - side * double(kerf)) / voxel);
+    }
+  }
+  return worst;
+}
+
+TEST(LevelSetPieces, VerticesOfCurvedBladesLieOnThem) {
+  // ALGORITHMS 4: 1e-3 of a voxel.
+  const auto level = ball(24);
+  const double voxel = double(level->voxelSize);
+  const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2}}};
+  const Knife hills = roughKnife(rough.plane, rough.roughness), tool(sphere({0, 0, 0}, 0.5f));
+  for (const float kerf : {0.0f, 0.05f * level->voxelSize, 0.5f * level->voxelSize}) {
+    EXPECT_LT(farthestFromBlade(cutLevelSet(*level, {.kerf = kerf, .rough = {rough}}), hills, kerf, voxel),
+              1e-3);
+    EXPECT_LT(farthestFromBlade(cutLevelSet(*level, {.kerf = kerf, .knives = {tool}}), tool, kerf, voxel),
+              1e-3);
+  }
+}
+
+TEST(LevelSetPieces, SidesOfANarrowKerfDoNotMeet) {
+  // The blade bends by more than the kerf is wide within a voxel.
+  const auto level = ball(16);
+  const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}},
+                         {.amplitude = 0.12f, .noise = {.frequency = 2, .seed = 1}}};
+  const MeshPieces cut = cutLevelSet(
+      *level,
+      {.kerf = 0.01f * level->voxelSize, .rough = {rough}, .knives = {Knife(sphere({0.1f, 0, 0}, 0.4f))}});
+  ASSERT_GT(cut.pieces.size(), 2u);
+  Mesh all;
+  for (const MeshPiece& piece : cut.pieces) {
+    EXPECT_EQ(countSelfIntersections(piece.mesh), 0u);
+    const auto first = std::uint32_t(all.positions.size());
+    all.positions.insert(all.positions.end(), piece.mesh.positions.begin(), piece.mesh.positions.end());
+    for (std::size_t f = 0; f < piece.mesh.faceCount(); ++f) {
+      const auto face = piece.mesh.face(f);
+      all.addFace(std::array{face[0] + first, face[1] + first, face[2] + first});
+    }
+  }
+  EXPECT_EQ(countSelfIntersections(all), 0u);
+}
+
+TEST(LevelSetPieces, VoronoiCellsAreThose) {
+  const auto level = ball(24);
+  const auto points = scatteredPoints(sphere({0, 0, 0}, 0.9f), kBall, 12, 1);
+  const MeshPieces cut = cutLevelSet(*level, {.cells = points});
+  expectSound(marchingTetrahedra(*level), cut);
+  EXPECT_EQ(cut.pieces.size(), 12u);
+  for (const MeshPiece& piece : cut.pieces)
+    for (const Vec3d& p : piece.mesh.positions)
+      for (const Vec3f& other : points)
+        EXPECT_LE(length(p - Vec3d(points[*piece.cell])), length(p - Vec3d(other)) + 1e-9);
+}
+
+TEST(LevelSetPieces, AKerfTakesItsWidthTimesTheArea) {
+  const auto level = ball(24);
+  const double whole = signedVolume(marchingTetrahedra(*level));
+  const float kerf = 0.04f;
+  const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}}, {.amplitude = 0.03f, .noise = {.frequency = 1.5f}}};
+  const Knife tool(sphere({0, 0, 0}, 0.6f));
+  const auto taken = [&](LevelSetCutOptions options) {
+    double area = 0;
+    for (const MeshPiece& piece : cutLevelSet(*level, options).pieces) area += insideArea(piece.mesh) / 2;
+    options.kerf = kerf;
+    const MeshPieces cut = cutLevelSet(*level, options);
+    EXPECT_EQ(cut.pieces.size(), 2u);
+    for (const MeshPiece& piece : cut.pieces) {
+      EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
+      EXPECT_TRUE(piece.neighbours.empty());
+    }
+    return (whole - volumeSum(cut)) / (double(kerf) * area);
+  };
+  EXPECT_NEAR(taken({.planes = {{{0, 0.2f, 0}, {0, 1, 1}}}}), 1, 0.01);
+  EXPECT_NEAR(taken({.rough = {rough}}), 1, 0.01);
+  EXPECT_NEAR(taken({.knives = {tool}}), 1, 0.01);
+  EXPECT_NEAR(taken({.cells = {{-0.5f, 0, 0}, {0.5f, 0.1f, 0}}}), 1, 0.01);
+}
+
+TEST(LevelSetPieces, PermutedKnivesMakeTheSameBits) {
+  const auto level = ball(20);
+  LevelSetCutOptions options{
+      .planes = randomBlades({.count = 4, .box = kBall, .throughCentre = true, .seed = 3}),
+      .cells = scatteredPoints(sphere({0, 0, 0}, 0.9f), kBall, 4, 1),
+      .rough = {{{{0, 0, 0}, {1, 0, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2}}},
+                {{{0, 0, 0}, {0, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2, .seed = 1}}}},
+      .knives = {Knife(sphere({0, 0, 1}, 0.7f)), Knife(sphere({0, 0, -1}, 0.5f)),
+                 Knife(sphere({0, 1, 0}, 1))}};
+  const MeshPieces cut = cutLevelSet(*level, options);
+  std::reverse(options.planes.begin(), options.planes.end());
+  std::reverse(options.cells.begin(), options.cells.end());
+  std::reverse(options.rough.begin(), options.rough.end());
+  std::rotate(options.knives.begin(), options.knives.begin() + 1, options.knives.end());
+  const MeshPieces other = cutLevelSet(*level, options);
+  ASSERT_EQ(cut.pieces.size(), other.pieces.size());
+  EXPECT_GT(cut.pieces.size(), 50u);
+  for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
+    const MeshPiece &a = cut.pieces[i], &b = other.pieces[i];
+    EXPECT_EQ(a.mesh.positions, b.mesh.positions);
+    EXPECT_EQ(a.mesh.corners, b.mesh.corners);
+    EXPECT_EQ(attributeOf(a.mesh, "uv").values, attributeOf(b.mesh, "uv").values);
+    EXPECT_EQ(*a.cell, 3 - *b.cell);
+    const auto& s = a.code.sides;
+    EXPECT_EQ(b.code.sides, (std::vector<bool>{s[3], s[2], s[1], s[0], s[5], s[4], s[7], s[8], s[6]}));
+  }
+}
+
+TEST(LevelSetPieces, AreTheSameAtAnyNumberOfThreads) {
+  const auto level = ball(24);
+  const LevelSetCutOptions options{.planes = randomBlades({.count = 3, .box = kBall}),
+                                   .knives = {Knife(sphere({0, 0, 1}, 0.7f))}};
+  const MeshPieces many = cutLevelSet(*level, options);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const MeshPieces alone = cutLevelSet(*level, options);
+  ASSERT_EQ(many.pieces.size(), alone.pieces.size());
+  for (std::size_t i = 0; i < many.pieces.size(); ++i) {
+    EXPECT_EQ(many.pieces[i].mesh.positions, alone.pieces[i].mesh.positions);
+    EXPECT_EQ(many.pieces[i].mesh.corners, alone.pieces[i].mesh.corners);
+  }
+}
+
+TEST(LevelSetPieces, InnerFacesHaveTheirPlacesAsTextureCoordinates) {
+  const auto level = ball(16);
+  const RoughBlade rough{{{0, 0.1f, 0}, {0, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 1}}};
+  const MeshPieces cut = cutLevelSet(*level, {.rough = {rough}});
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  for (const MeshPiece& piece : cut.pieces) {
+    const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
+    ASSERT_LT(firstInside(piece.mesh), piece.mesh.faceCount());
+    for (std::size_t c = 3 * firstInside(piece.mesh); c < piece.mesh.corners.size(); ++c) {
+      // Across y: x and z, in some order and direction.
+      const Vec3d& p = piece.mesh.positions[piece.mesh.corners[c]];
+      EXPECT_NEAR(std::hypot(double(uv.values[2 * c]), double(uv.values[2 * c + 1])), std::hypot(p.x, p.z),
+                  1e-6);
+    }
+  }
+}
+
+TEST(LevelSetPieces, SliversBelowAVoxelAreLeftOutAndCounted) {
+  const auto level = ball(10);
+  const double voxel = std::pow(double(level->voxelSize), 3);
+  // A cap of height 0.02: pi h^2 (1 - h / 3), 1.25 of a thousandth.
+  const LevelSetCutOptions options{.planes = {{{0, 0.985f, 0}, {0, 1, 0}}}};
+  const MeshPieces cut = cutLevelSet(*level, options);
+  ASSERT_EQ(cut.pieces.size(), 1u);
+  EXPECT_EQ(cut.slivers, 1u);
+  EXPECT_GT(cut.sliverVolume, 0);
+  EXPECT_LT(cut.sliverVolume, voxel);
+  LevelSetCutOptions all = options;
+  all.minVolume = 0.0;
+  EXPECT_EQ(cutLevelSet(*level, all).pieces.size(), 2u);
+}
+
+TEST(LevelSetPieces, AreSoundOnAnySamplesByAnyFields) {
+  std::size_t checked = 0;
+  for (std::uint32_t seed = 0; seed < 100; ++seed) {
+    const int side = 3 + int(seed / 4 % 4);
+    const auto level = randomLattice(seed, side);
+    const Mesh whole = marchingTetrahedra(*level);
+    if (whole.faceCount() == 0) continue;
+    std::mt19937 random(seed);
+    LevelSetCutOptions options{.minVolume = 0.0};
+    const int fields = 1 + int(random() % 3);
+    for (int k = 0; k < fields; ++k)
+      options.knives.push_back(gridField(randomLattice(std::uint32_t(random()), side)));
+    if (random() % 4 == 0) options.kerf = 0.1f;
+    const MeshPieces cut = cutLevelSet(*level, options);
+    for (const MeshPiece& piece : cut.pieces) {
+      const Topology topology = topologyOf(piece.mesh);
+      ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
+      ASSERT_GT(piece.mass.volume, 0) << seed;
+      ++checked;
+    }
+    if (options.kerf == 0) {
+      // Where knives are near, a sample of 0 counts as 2^-29 of the largest.
+      ASSERT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 0x1p-29) << seed;
+    }
+  }
+  EXPECT_GT(checked, 300u);
+}
+
+TEST(LevelSetPieces, AreSoundOnAnySamplesByPlanes) {
+  for (std::uint32_t seed = 0; seed < 120; ++seed) {
+    const auto level = randomLattice(seed, 3 + int(seed / 4 % 4));
+    const Mesh whole = marchingTetrahedra(*level);
+    if (whole.faceCount() == 0) continue;
+    LevelSetCutOptions options{.minVolume = 0.0};
+    options.planes = randomBlades({.count = 2, .box = boundingBox(whole), .seed = seed});
+    options.planes.push_back({{0, 7, 0}, {0, 1, 0}});  // through samples
+    const MeshPieces cut = cutLevelSet(*level, options);
+    for (const MeshPiece& piece : cut.pieces) {
+      const Topology topology = topologyOf(piece.mesh);
+      ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
+    }
+    ASSERT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 1e-10) << seed;
+    // Together with fields, whose faces may lie in the plane, surfaces may touch themselves along edges.
+    options.knives.push_back(gridField(randomLattice(seed + 1, 5)));
+    for (const MeshPiece& piece : cutLevelSet(*level, options).pieces)
+      ASSERT_TRUE(topologyOf(piece.mesh).isClosedManifold())
+          << "seed " << seed << ": " << topologyOf(piece.mesh);
+  }
+}
+
+TEST(LevelSetPieces, TheCubeInManyWaysIsWhole) {
+  const std::string path = sharedData("volumes/cube_levelset.vdb");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  // Every fifth sample: the file itself, of 1.5 million, is cut through the program.
+  const auto fine = toBricks(readScalarGrid(path));
+  const float h = 5 * fine->voxelSize;
+  const auto level = bakeGrid(gridField(fine), {.voxelSize = h, .box = fine->worldBox()});
+  const Mesh whole = marchingTetrahedra(*level);
+  const Box box = boundingBox(whole);
+  const RoughnessOptions hills{.amplitude = 0.2f, .noise = {.frequency = 0.4f}};
+  std::vector<LevelSetCutOptions> ways;
+  for (const int n : {1, 5, 20}) ways.push_back({.planes = randomBlades({.count = n, .box = box})});
+  ways.push_back({.cells = scatteredPoints(gridField(level), box, 12, 1)});
+  ways.emplace_back();
+  for (const BladePlane& blade : randomBlades({.count = 3, .box = box}))
+    ways.back().rough.push_back({blade, hills});
+  for (const LevelSetCutOptions& options : ways) {
+    const MeshPieces cut = cutLevelSet(*level, options);
+    EXPECT_GT(cut.pieces.size(), 1u);
+    expectSound(whole, cut);
+  }
+}
+
+TEST(LevelSetPieces, TheBunnyCutByPlanesHillsAndABallIsWhole) {
+  const std::string path = sharedData("meshes/bunny_7k.obj");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  const Mesh bunny = readMesh(path);
+  const Box box = boundingBox(bunny);
+  const float size = box.longestSide();
+  const auto level = toBricks(meshToLevelSet(bunny, {.voxelSize = double(size) / 128}));
+  LevelSetCutOptions options{.planes = randomBlades({.count = 2, .box = box}),
+                             .knives = {Knife(sphere(box.center(), 0.2f * size))}};
+  options.rough.push_back(
+      {{box.center(), {0, 1, 0}}, {.amplitude = 0.01f * size, .noise = {.frequency = 5 / size}}});
+  const MeshPieces cut = cutLevelSet(*level, options);
+  EXPECT_GE(cut.pieces.size(), 12u);
+  expectSound(marchingTetrahedra(*level), cut);
+}
+
+TEST(LevelSetPieces, RefuseWhatMakesNoSense) {
+  const auto level = ball(8);
+  const auto refused = [&](const LevelSetCutOptions& options) {
+    EXPECT_THROW(cutLevelSet(*level, options), Error);
+  };
+  refused({.planes = {{{0, 0, 0}, {0, 0, 0}}}});
+  refused({.cells = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}});
+  refused({.kerf = -1});
+  refused({.knives = {Knife(sphere({0, 0, 0}, 1), 0.5f)}});
+  refused({.minVolume = -1.0});
+  struct Stop : Progress {
+    bool cancelled() const override { return true; }
+  } stop;
+  EXPECT_THROW(cutLevelSet(*level, {}, stop), Cancelled);
+}
+
+}  // namespace
+}  // namespace nephele::test

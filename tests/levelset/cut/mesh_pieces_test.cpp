@@ -1,0 +1,440 @@
+#include "nephele/levelset/cut/mesh_pieces.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/support/mesh_topology.h"
+#include "tests/support/piece_checks.h"
+#include "tests/support/test_data.h"
+#include "tests/support/test_meshes.h"
+
+namespace nephele::test {
+namespace {
+
+Mesh cube() {
+  return boxMesh({-1, -1, -1}, {1, 1, 1});
+}
+
+/// A tower of height 2 on the left half of a slab of height 1, one unit deep.
+Mesh step() {
+  const std::array<std::array<double, 2>, 6> outline{{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}};
+  Mesh mesh;
+  for (const double z : {0.0, 1.0})
+    for (const auto& p : outline) mesh.positions.push_back({p[0], p[1], z});
+  mesh.addFace(std::vector<std::uint32_t>{0, 5, 4, 3});
+  mesh.addFace(std::vector<std::uint32_t>{0, 3, 2, 1});
+  mesh.addFace(std::vector<std::uint32_t>{6, 9, 10, 11});
+  mesh.addFace(std::vector<std::uint32_t>{6, 7, 8, 9});
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const std::uint32_t j = (i + 1) % 6;
+    mesh.addFace(std::vector<std::uint32_t>{i, j, j + 6, i + 6});
+  }
+  return mesh;
+}
+
+Mesh insideOut(const Mesh& mesh) {
+  Mesh result = mesh;
+  for (std::size_t f = 0; f < mesh.faceCount(); ++f)
+    std::reverse(result.corners.begin() + mesh.faceStart[f], result.corners.begin() + mesh.faceStart[f + 1]);
+  return result;
+}
+
+TEST(MassProperties, OfABoxAreThoseOfTheTextbook) {
+  const MassProperties mass = massProperties(boxMesh({1, 2, 3}, {3, 5, 7}));
+  // Sides 2, 3, 4: V = 24, I = V (b^2 + c^2) / 12.
+  EXPECT_NEAR(mass.volume, 24, 1e-12);
+  EXPECT_NEAR(mass.area, 52, 1e-12);
+  EXPECT_NEAR(length(mass.centroid - Vec3d(2, 3.5, 5)), 0, 1e-12);
+  EXPECT_NEAR(mass.inertia[0], 24 * (9 + 16) / 12.0, 1e-11);
+  EXPECT_NEAR(mass.inertia[4], 24 * (4 + 16) / 12.0, 1e-11);
+  EXPECT_NEAR(mass.inertia[8], 24 * (4 + 9) / 12.0, 1e-11);
+  for (const std::size_t k : {1, 2, 3, 5, 6, 7}) EXPECT_NEAR(mass.inertia[k], 0, 1e-11);
+}
+
+TEST(MassProperties, OfACornerTetrahedronHaveItsProductsOfInertia) {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const auto& face : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})
+    mesh.addFace(face);
+  const MassProperties mass = massProperties(mesh);
+  // Integrals over the simplex: x^2 -> 1/60, x y -> 1/120; shifted to the centroid (1/4, 1/4, 1/4).
+  EXPECT_NEAR(mass.volume, 1 / 6.0, 1e-15);
+  EXPECT_NEAR(length(mass.centroid - Vec3d(0.25, 0.25, 0.25)), 0, 1e-15);
+  EXPECT_NEAR(mass.inertia[0], 2 / 60.0 - 2 / 96.0, 1e-15);
+  EXPECT_NEAR(mass.inertia[1], -(1 / 120.0 - 1 / 96.0), 1e-15);
+}
+
+TEST(MeshPieces, APlaneThroughTheCentreHalvesACube) {
+  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 2, 0}}}});
+  expectSound(cube(), cut);
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  for (const std::size_t k : {0, 1}) {
+    const MeshPiece& piece = cut.pieces[k];
+    EXPECT_EQ(piece.code.sides, std::vector<bool>{k == 1});
+    EXPECT_NEAR(piece.mass.volume, 4, 1e-14);
+    EXPECT_NEAR(piece.mass.area, 16, 1e-14);
+    EXPECT_NEAR(piece.mass.centroid.y, k == 1 ? 0.5 : -0.5, 1e-14);
+    EXPECT_EQ(piece.boxMin, (k == 1 ? Vec3d{-1, 0, -1} : Vec3d{-1, -1, -1}));
+    EXPECT_EQ(piece.boxMax, (k == 1 ? Vec3d{1, 1, 1} : Vec3d{1, 0, 1}));
+    EXPECT_NEAR(insideArea(piece.mesh), 4, 1e-14);
+    ASSERT_EQ(piece.neighbours.size(), 1u);
+    EXPECT_EQ(piece.neighbours[0].piece, 1 - k);
+    EXPECT_NEAR(piece.neighbours[0].area, 4, 1e-14);
+  }
+}
+
+TEST(MeshPieces, APlaneInAFaceOfABoxCutsNothing) {
+  for (const float y : {-1.0f, 1.0f})
+    for (const float up : {-1.0f, 1.0f}) {
+      const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, y, 0}, {0, up, 0}}}});
+      ASSERT_EQ(cut.pieces.size(), 1u);
+      EXPECT_EQ(cut.slivers, 0u);
+      EXPECT_EQ(cut.pieces[0].mesh.faceCount(), 12u);
+      EXPECT_EQ(firstInside(cut.pieces[0].mesh), 12u);
+      EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{y * up < 0});
+    }
+}
+
+TEST(MeshPieces, APlaneInTheFaceOfAStepLeavesThatFaceOutside) {
+  for (const float up : {-1.0f, 1.0f}) {
+    const MeshPieces cut = cutMesh(step(), {.planes = {{{0, 1, 0}, {0, up, 0}}}});
+    expectSound(step(), cut);
+    ASSERT_EQ(cut.pieces.size(), 2u);
+    EXPECT_EQ(cut.slivers, 0u);
+    std::vector<double> volumes;
+    for (const MeshPiece& piece : cut.pieces) {
+      volumes.push_back(piece.mass.volume);
+      // Only what was under the tower is new.
+      EXPECT_NEAR(insideArea(piece.mesh), 1, 1e-14);
+    }
+    std::sort(volumes.begin(), volumes.end());
+    EXPECT_NEAR(volumes[0], 1, 1e-14);
+    EXPECT_NEAR(volumes[1], 2, 1e-14);
+  }
+}
+
+TEST(MeshPieces, PlanesThatMeetInTheEdgesOfATetrahedronLeaveAnOctahedron) {
+  Mesh mesh;
+  mesh.positions = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  for (const auto& face : {std::array<std::uint32_t, 3>{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}})
+    mesh.addFace(face);
+  MeshCutOptions options;
+  // Halfway to each corner: all four planes pass through the middles of edges, two by two.
+  for (const Vec3d& corner : mesh.positions) options.planes.push_back({Vec3f(corner / 3.0), Vec3f(corner)});
+  const MeshPieces cut = cutMesh(mesh, options);
+  expectSound(mesh, cut);
+  ASSERT_EQ(cut.pieces.size(), 5u);
+  std::vector<double> volumes;
+  for (const MeshPiece& piece : cut.pieces) volumes.push_back(piece.mass.volume * 3 / 8);
+  std::sort(volumes.begin(), volumes.end());
+  for (const std::size_t k : {0, 1, 2, 3}) EXPECT_NEAR(volumes[k], 1 / 8.0, 1e-7);
+  EXPECT_NEAR(volumes[4], 1 / 2.0, 1e-7);
+}
+
+TEST(MeshPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
+  const Mesh ball = icosphere(1, 3);
+  for (const int n : {1, 3, 5, 8}) {
+    const MeshPieces cut = cutMesh(
+        ball, {.planes = randomBlades({.count = n, .box = boundingBox(ball), .throughCentre = true})});
+    expectSound(ball, cut);
+    EXPECT_EQ(cut.pieces.size(), std::size_t(n * n - n + 2));
+    for (const MeshPiece& piece : cut.pieces) EXPECT_EQ(countSelfIntersections(piece.mesh), 0u);
+  }
+}
+
+TEST(MeshPieces, VerticesInThePlaneAreNotDoubled) {
+  // The icosahedron's edges are halved in the planes of its axes: many vertices lie in them exactly.
+  const Mesh ball = icosphere(1, 3);
+  const MeshPieces cut =
+      cutMesh(ball, {.planes = {{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {0, 0, 1}}}});
+  expectSound(ball, cut);
+  ASSERT_EQ(cut.pieces.size(), 8u);
+  for (const MeshPiece& piece : cut.pieces) {
+    EXPECT_NEAR(piece.mass.volume, signedVolume(ball) / 8, 1e-12);
+    for (std::size_t f = 0; f < piece.mesh.faceCount(); ++f) EXPECT_GT(faceArea(piece.mesh, f), 1e-12);
+    const auto same = firstEqualPosition(piece.mesh.positions);
+    for (std::size_t i = 0; i < same.size(); ++i) EXPECT_EQ(same[i], i);
+  }
+}
+
+TEST(MeshPieces, CutsOfKnownMeshesSumToThem) {
+  for (const char* name : {"bunny_7k.obj", "spot_uv.obj", "fertility_genus4.off", "fandisk_13k.obj"}) {
+    const std::string path = sharedData(std::string("meshes/") + name);
+    NEPHELE_REQUIRE_SHARED_DATA(path);
+    SCOPED_TRACE(name);
+    const Mesh mesh = readMesh(path);
+    for (const int n : {1, 5, 20}) {
+      const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = n, .box = boundingBox(mesh)})});
+      EXPECT_GT(cut.pieces.size(), std::size_t(n));
+      expectSound(mesh, cut);
+    }
+    const auto points = scatteredPoints(ScalarField(1), boundingBox(mesh), 12, 1);
+    const MeshPieces cut = cutMesh(mesh, {.cells = points});
+    EXPECT_GE(cut.pieces.size(), 10u);
+    expectSound(mesh, cut);
+  }
+}
+
+TEST(MeshPieces, TheBunnyInAHundredCellsIsWhole) {
+  const std::string path = sharedData("meshes/bunny_60k.obj");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  const Mesh bunny = readMesh(path);
+  const auto points = scatteredPoints(ScalarField(1), boundingBox(bunny), 100, 1);
+  const MeshPieces cut = cutMesh(bunny, {.cells = points});
+  expectSound(bunny, cut);
+  for (const MeshPiece& piece : cut.pieces) {
+    ASSERT_TRUE(piece.cell);
+    // Every vertex is as near to its point as to any other.
+    const Vec3d centre(points[*piece.cell]);
+    for (std::size_t i = 0; i < piece.mesh.positions.size(); i += 29)
+      for (const Vec3f& other : points)
+        EXPECT_LE(length(piece.mesh.positions[i] - centre),
+                  length(piece.mesh.positions[i] - Vec3d(other)) + 1e-9);
+  }
+}
+
+TEST(MeshPieces, RimsAreSharp) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  const auto blades = randomBlades({.count = 4, .box = boundingBox(mesh), .seed = 2});
+  for (const MeshPiece& piece : cutMesh(mesh, {.planes = blades}).pieces)
+    for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f) {
+      double nearest = 1;
+      for (const BladePlane& blade : blades) {
+        double farthest = 0;
+        for (const std::uint32_t v : piece.mesh.face(f))
+          farthest = std::max(farthest, std::abs(dot(piece.mesh.positions[v] - Vec3d(blade.point),
+                                                     normalize(Vec3d(blade.normal)))));
+        nearest = std::min(nearest, farthest);
+      }
+      EXPECT_LT(nearest, 1e-10);
+    }
+}
+
+TEST(MeshPieces, PermutedPlanesMakeTheSamePieces) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  auto blades = randomBlades({.count = 6, .box = boundingBox(mesh), .seed = 3});
+  const MeshPieces cut = cutMesh(mesh, {.planes = blades});
+  std::reverse(blades.begin(), blades.end());
+  const MeshPieces other = cutMesh(mesh, {.planes = blades});
+  ASSERT_EQ(cut.pieces.size(), other.pieces.size());
+  for (const MeshPiece& piece : cut.pieces) {
+    std::vector<bool> sides(piece.code.sides.rbegin(), piece.code.sides.rend());
+    const auto same = std::count_if(other.pieces.begin(), other.pieces.end(), [&](const MeshPiece& p) {
+      return p.code.sides == sides && std::abs(p.mass.volume - piece.mass.volume) < 1e-12 &&
+             std::abs(p.mass.area - piece.mass.area) < 1e-10 &&
+             length(p.mass.centroid - piece.mass.centroid) < 1e-8;
+    });
+    EXPECT_EQ(same, 1);
+  }
+}
+
+TEST(MeshPieces, OuterFacesKeepTheirTextureCoordinates) {
+  const std::string path = sharedData("meshes/spot_uv.obj");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  const Mesh spot = triangulated(readMesh(path));
+  const MeshPieces cut = cutMesh(spot, {.planes = randomBlades({.count = 5, .box = boundingBox(spot)})});
+  std::size_t checked = 0;
+  EXPECT_LT(worstTexture(spot, cut, 4, checked), 1e-5);
+  EXPECT_GT(checked, 1000u);
+}
+
+TEST(MeshPieces, InnerFacesMeasureTheKnifeInWorldUnits) {
+  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0.25f, 0}, {1, 2, 3}}}});
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  for (const MeshPiece& piece : cut.pieces) {
+    const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
+    for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t i = 3 * f + k, j = 3 * f + (k + 1) % 3;
+        const double du = double(uv.values[2 * i]) - double(uv.values[2 * j]);
+        const double dv = double(uv.values[2 * i + 1]) - double(uv.values[2 * j + 1]);
+        EXPECT_NEAR(
+            std::hypot(du, dv),
+            length(piece.mesh.positions[piece.mesh.corners[i]] - piece.mesh.positions[piece.mesh.corners[j]]),
+            1e-6);
+      }
+  }
+}
+
+TEST(MeshPieces, GroupsAndVertexColoursContinue) {
+  Mesh mesh = cube();
+  mesh.groups = {{"bottom and top", 2, 4}, {"rest", 6, 6}};
+  MeshAttribute colour{"color", MeshAttribute::Domain::vertex, 3, {}};
+  for (const Vec3d& p : mesh.positions)
+    for (const int k : {0, 1, 2}) colour.values.push_back(float(p[k]));
+  mesh.attributes.push_back(colour);
+  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0.25f, 0, 0}, {1, 0.5f, 0.25f}}}});
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  for (const MeshPiece& piece : cut.pieces) {
+    ASSERT_EQ(piece.mesh.groups.size(), 3u);
+    EXPECT_EQ(piece.mesh.groups[0].name, "bottom and top");
+    EXPECT_EQ(piece.mesh.groups[1].name, "rest");
+    EXPECT_EQ(piece.mesh.groups[2].name, "inside");
+    EXPECT_EQ(piece.mesh.groups[2].firstFace + piece.mesh.groups[2].faceCount, piece.mesh.faceCount());
+    // The colour of the source is its place, and places are linear on triangles.
+    const MeshAttribute& value = attributeOf(piece.mesh, "color");
+    ASSERT_EQ(value.domain, MeshAttribute::Domain::vertex);
+    for (std::size_t i = 0; i < piece.mesh.positions.size(); ++i)
+      for (const int k : {0, 1, 2})
+        EXPECT_NEAR(value.values[3 * i + std::size_t(k)], piece.mesh.positions[i][k], 1e-6);
+  }
+}
+
+TEST(MeshPieces, CellsOfALatticeAreItsBoxes) {
+  std::vector<Vec3f> points;
+  for (int i = 0; i < 8; ++i)
+    points.push_back({i & 1 ? 0.5f : -0.5f, i & 2 ? 0.5f : -0.5f, i & 4 ? 0.5f : -0.5f});
+  const MeshPieces cut = cutMesh(cube(), {.cells = points});
+  ASSERT_EQ(cut.pieces.size(), 8u);
+  expectSound(cube(), cut);
+  for (std::uint32_t k = 0; k < 8; ++k) {
+    EXPECT_EQ(cut.pieces[k].cell, k);
+    EXPECT_NEAR(cut.pieces[k].mass.volume, 1, 1e-12);
+    EXPECT_EQ(cut.pieces[k].neighbours.size(), 3u);
+  }
+}
+
+TEST(MeshPieces, CellsAndPlanesCutTogether) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  const auto points = scatteredPoints(ScalarField(1), boundingBox(mesh), 10, 4);
+  const MeshPieces cut =
+      cutMesh(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)}), .cells = points});
+  EXPECT_GT(cut.pieces.size(), 20u);
+  expectSound(mesh, cut);
+}
+
+TEST(MeshPieces, APlaneThatMissesLeavesTheMeshAsItIs) {
+  const Mesh mesh = icosphere(1, 2);
+  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0, 2, 0}, {0, 1, 0}}}});
+  ASSERT_EQ(cut.pieces.size(), 1u);
+  EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{false});
+  EXPECT_EQ(cut.pieces[0].mesh.faceCount(), mesh.faceCount());
+  EXPECT_EQ(cut.pieces[0].mass.volume, massProperties(mesh).volume);
+}
+
+TEST(MeshPieces, CoincidentPlanesCutOnce) {
+  const Mesh mesh = icosphere(1, 3);
+  const Vec3f n{1, 2, 3};
+  // The third is the first, turned over and moved in itself; the fourth is off by less than rounding.
+  const MeshPieces cut = cutMesh(
+      mesh, {.planes = {{{0, 0, 0}, n}, {{0, 0, 0}, n}, {{2, -1, 0}, -n}, {{0, 0, 1e-13f}, n * 2.0f}}});
+  expectSound(mesh, cut);
+  ASSERT_EQ(cut.pieces.size(), 2u);
+  EXPECT_EQ(cut.slivers, 0u);
+  EXPECT_EQ(cut.pieces[0].code.sides, (std::vector<bool>{false, false, true, false}));
+  EXPECT_EQ(cut.pieces[1].code.sides, (std::vector<bool>{true, true, false, true}));
+}
+
+TEST(MeshPieces, NearlyCoincidentPlanesStayClosed) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  for (const float angle : {1e-4f, 1e-6f, 1e-8f}) {
+    MeshCutOptions options;
+    for (int k = 0; k < 6; ++k)
+      options.planes.push_back({{0.1f, 0, 0}, {1, angle * float(k), angle * float(k * k % 5)}});
+    expectSound(mesh, cutMesh(mesh, options));
+  }
+}
+
+TEST(MeshPieces, CavitiesStayWithTheSolidAroundThem) {
+  const Mesh mesh = joined(cube(), insideOut(boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})));
+  const MeshPieces beside = cutMesh(mesh, {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}});
+  ASSERT_EQ(beside.pieces.size(), 2u);
+  EXPECT_NEAR(beside.pieces[0].mass.volume, 4 * 1.75 - 1, 1e-12);
+  EXPECT_NEAR(beside.pieces[1].mass.volume, 4 * 0.25, 1e-12);
+  const MeshPieces through = cutMesh(mesh, {.planes = {{{0, 0, 0}, {0, 1, 0}}}});
+  expectSound(mesh, through);
+  ASSERT_EQ(through.pieces.size(), 2u);
+  for (const MeshPiece& piece : through.pieces) {
+    EXPECT_NEAR(piece.mass.volume, 3.5, 1e-12);
+    EXPECT_NEAR(insideArea(piece.mesh), 3, 1e-12);
+    EXPECT_EQ(topologyOf(piece.mesh).eulerCharacteristic, 2);
+  }
+}
+
+TEST(MeshPieces, PartsOfOneSideThatDoNotHangTogetherAreSeveralPieces) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0.2f, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {1, 0, 0}}}});
+  EXPECT_EQ(cut.pieces.size(), 4u);
+  const MeshPieces slab = cutMesh(mesh, {.planes = {{{0, 0.1f, 0}, {0, 1, 0}}, {{0, -0.1f, 0}, {0, 1, 0}}}});
+  // Above, below, and the two ends of the slab between, left and right of the hole.
+  EXPECT_EQ(slab.pieces.size(), 4u);
+  expectSound(mesh, slab);
+}
+
+TEST(MeshPieces, SliversAreLeftOutAndCounted) {
+  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}, .minVolume = 1.5});
+  ASSERT_EQ(cut.pieces.size(), 1u);
+  EXPECT_EQ(cut.slivers, 1u);
+  EXPECT_NEAR(cut.sliverVolume, 1, 1e-14);
+  EXPECT_NEAR(volumeSum(cut), 8, 1e-14);
+  EXPECT_TRUE(cut.pieces[0].neighbours.empty());
+}
+
+TEST(MeshPieces, VerticesThatOnlyCoincideAreJoined) {
+  const Mesh mesh = unshared(torusMesh(1, 0.4, 20, 10));
+  const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)})});
+  expectSound(mesh, cut);
+}
+
+TEST(MeshPieces, OfOverlappingSolidsHaveNoOpenEdgeAndTheSignedVolume) {
+  const Mesh mesh = joined(icosphere(1, 2), icosphere(1, 2, {0.7, 0.1, 0}));
+  const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = 5, .box = boundingBox(mesh)})});
+  EXPECT_NEAR(volumeSum(cut), signedVolume(mesh), 1e-12);
+  for (const MeshPiece& piece : cut.pieces)
+    EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold()) << topologyOf(piece.mesh);
+}
+
+TEST(MeshPieces, OfManyPlanesAreAllThere) {
+  const Mesh ball = icosphere(1, 3);
+  const MeshPieces cut =
+      cutMesh(ball, {.planes = randomBlades({.count = 70, .box = boundingBox(ball), .throughCentre = true})});
+  EXPECT_EQ(cut.pieces.size() + cut.slivers, 70u * 70u - 70u + 2u);
+  EXPECT_NEAR(volumeSum(cut), signedVolume(ball), 1e-12);
+}
+
+TEST(MeshPieces, DoNotDependOnTheNumberOfThreads) {
+  const Mesh mesh = torusMesh(1, 0.4, 40, 20);
+  const MeshCutOptions options{.planes = randomBlades({.count = 2, .box = boundingBox(mesh)}),
+                               .cells = scatteredPoints(ScalarField(1), boundingBox(mesh), 20, 4)};
+  const MeshPieces cut = cutMesh(mesh, options);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const MeshPieces again = cutMesh(mesh, options);
+  ASSERT_EQ(cut.pieces.size(), again.pieces.size());
+  for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
+    EXPECT_EQ(cut.pieces[i].mesh.positions, again.pieces[i].mesh.positions);
+    EXPECT_EQ(cut.pieces[i].mesh.corners, again.pieces[i].mesh.corners);
+    EXPECT_EQ(cut.pieces[i].mass.volume, again.pieces[i].mass.volume);
+  }
+}
+
+TEST(MeshPieces, RefuseWhatCannotBeCut) {
+  Mesh open = cube();
+  open.corners.resize(33);
+  open.faceStart.pop_back();
+  try {
+    cutMesh(open, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("open: 3 edges"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(cutMesh({}, {}), Error);
+  EXPECT_THROW(cutMesh(insideOut(cube()), {}), Error);
+  Mesh notFinite = cube();
+  notFinite.positions[3].x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(cutMesh(notFinite, {}), Error);
+  EXPECT_THROW(cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 0, 0}}}}), Error);
+  EXPECT_THROW(cutMesh(cube(), {.planes = {{{0, NAN, 0}, {0, 1, 0}}}}), Error);
+  EXPECT_THROW(cutMesh(cube(), {.cells = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}}), Error);
+  EXPECT_THROW(cutMesh(cube(), {.cells = {{0, 0, INFINITY}}}), Error);
+  EXPECT_THROW(cutMesh(cube(), {.minVolume = -1}), Error);
+}
+
+}  // namespace
+}  // namespace nephele::test

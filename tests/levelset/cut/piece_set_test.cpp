@@ -1,0 +1,132 @@
+#include "nephele/levelset/cut/piece_set.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "nephele/levelset/cut/piece_files.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/point_io.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/support/mesh_topology.h"
+#include "tests/support/run_program.h"
+#include "tests/support/test_meshes.h"
+
+namespace nephele::test {
+namespace {
+
+const BladePlane kAcrossX{{0, 0, 0}, {1, 0, 0}}, kAcrossY{{0, 0.1f, 0}, {0.2f, 1, 0.1f}};
+
+double innerArea(const Mesh& mesh) {
+  double area = 0;
+  for (const MeshGroup& group : mesh.groups)
+    for (std::size_t f = group.firstFace; group.name == "inside" && f < group.firstFace + group.faceCount;
+         ++f) {
+      const auto v = mesh.face(f);
+      const Vec3d& a = mesh.positions[v[0]];
+      area += length(cross(mesh.positions[v[1]] - a, mesh.positions[v[2]] - a)) / 2;
+    }
+  return area;
+}
+
+std::vector<CutPart> partsOf(const PieceSet& set) {
+  std::vector<CutPart> parts;
+  for (const NamedPiece& piece : set.pieces)
+    parts.push_back({.name = piece.name, .parent = piece.parent, .mesh = piece.mesh});
+  return parts;
+}
+
+TEST(PieceSet, ContactsAreFoundAcrossAnEarlierCut) {
+  const std::vector<CutPart> model{{.mesh = icosphere(1, 3)}};
+  const PieceSet first = cutParts(model, {.planes = {kAcrossX}});
+  ASSERT_EQ(first.pieces.size(), 2u);
+  const PieceSet again = cutParts(partsOf(first), {.planes = {kAcrossY}});
+  const PieceSet atOnce = cutParts(model, {.planes = {kAcrossX, kAcrossY}});
+  ASSERT_EQ(again.pieces.size(), 4u);
+  EXPECT_NEAR(again.volumeSum, atOnce.volumeSum, 1e-12);
+  for (const NamedPiece& piece : again.pieces) {
+    EXPECT_TRUE(piece.closed);
+    // Every inner face touches another piece: two neighbours, one across either plane.
+    ASSERT_EQ(piece.neighbours.size(), 2u);
+    EXPECT_NEAR(piece.neighbours[0].area + piece.neighbours[1].area, innerArea(piece.mesh), 1e-9);
+  }
+  EXPECT_EQ(again.pieces[0].name, "piece_0001_0001");
+  EXPECT_EQ(again.pieces[3].name, "piece_0002_0002");
+  EXPECT_EQ(again.pieces[3].parent, "piece_0002");
+}
+
+TEST(PieceSet, PartsThatNoKnifeTouchesStayAsTheyAre) {
+  const std::vector<CutPart> model{{.mesh = boxMesh({-1, -1, -1}, {1, 1, 1})}};
+  const PieceSet first = cutParts(model, {.planes = {kAcrossX}});
+  const PieceSet again = cutParts(partsOf(first), {.planes = {{{0.5f, 0, 0}, {1, 0, 0}}}});
+  ASSERT_EQ(again.pieces.size(), 3u);
+  EXPECT_EQ(again.pieces[0].name, "piece_0001");
+  EXPECT_EQ(again.pieces[0].parent, "");
+  EXPECT_EQ(again.pieces[0].mesh.positions, first.pieces[0].mesh.positions);
+  EXPECT_EQ(again.pieces[0].mesh.corners, first.pieces[0].mesh.corners);
+  // The model itself becomes a piece even where nothing cuts it.
+  const PieceSet missed = cutParts(model, {.planes = {{{5, 0, 0}, {1, 0, 0}}}});
+  ASSERT_EQ(missed.pieces.size(), 1u);
+  EXPECT_EQ(missed.pieces[0].name, "piece_0001");
+}
+
+TEST(PieceSet, RefusesNamesThatWouldBeGivenTwice) {
+  std::vector<CutPart> parts{{.name = "a", .parent = "", .mesh = boxMesh({-1, -1, -1}, {1, 1, 1})},
+                             {.name = "a_0001", .parent = "", .mesh = boxMesh({5, -1, -1}, {7, 1, 1})}};
+  EXPECT_THROW(cutParts(parts, {.planes = {kAcrossX}}), Error);
+  parts[1].name = "a";
+  EXPECT_THROW(cutParts(parts, {.planes = {kAcrossX}}), Error);
+  EXPECT_THROW(cutParts({}, {}), Error);
+}
+
+TEST(PieceSet, MovesPiecesApartFromTheMiddleOfAll) {
+  const std::vector<CutPart> model{{.mesh = boxMesh({-1, 0, 0}, {3, 1, 1})}};
+  const PieceSet set = cutParts(model, {.planes = {kAcrossX}});
+  // Centroids at x = -0.5 and 1.5, of all at 1.
+  const std::vector<Vec3d> offsets = explodedOffsets(set, 0.5);
+  EXPECT_NEAR(length(offsets[0] - Vec3d{-0.75, 0, 0}), 0, 1e-12);
+  EXPECT_NEAR(length(offsets[1] - Vec3d{0.25, 0, 0}), 0, 1e-12);
+}
+
+TEST(PieceFiles, KnowTheNamesOfPieces) {
+  for (const char* name : {"piece_0001", "piece_12345", "piece_0001_0002", "piece_0001_0002_0003"})
+    EXPECT_TRUE(isPieceName(name)) << name;
+  for (const char* name : {"piece", "piece_", "piece_001", "piece_0001_", "piece_0001_a", "apiece_0001",
+                           "piece0001", "piece_0001 ", ""})
+    EXPECT_FALSE(isPieceName(name)) << name;
+}
+
+TEST(ObjMaterials, AreReadWithTheirGroups) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("m.obj"))
+      << "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
+         "f 1 3 2\ng back\nf 2 3 1\nusemtl dark blue\nf 3 2 1\n";
+  const Mesh mesh = readMesh(folder.file("m.obj"));
+  ASSERT_EQ(mesh.groups.size(), 3u);
+  EXPECT_EQ(mesh.groups[0].name, "red");
+  EXPECT_EQ(mesh.groups[0].faceCount, 2u);
+  EXPECT_EQ(mesh.groups[1].name, "back");
+  EXPECT_EQ(mesh.groups[1].material, "red");
+  EXPECT_EQ(mesh.groups[2].name, "back");
+  EXPECT_EQ(mesh.groups[2].material, "dark blue");
+  ASSERT_EQ(mesh.materialFiles.size(), 1u);
+  EXPECT_EQ(mesh.materialFiles[0], folder.file("colours.mtl"));
+  EXPECT_EQ(triangulated(mesh).groups[2].material, "dark blue");
+}
+
+TEST(Points, AreReadFromText) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("p.csv"))
+      << "x;y;z\r\n1;2;3\r\n\r\n# a comment\r\n +4, -5e-1 ,6,extra\r\n7\t8\t9";
+  const Mesh points = readPoints(folder.file("p.csv"));
+  EXPECT_EQ(points.positions, (std::vector<Vec3d>{{1, 2, 3}, {4, -0.5, 6}, {7, 8, 9}}));
+  for (const char* bad :
+       {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n", ""}) {
+    std::ofstream(folder.file("bad.txt")) << bad;
+    EXPECT_THROW(readPoints(folder.file("bad.txt")), Error) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace nephele::test

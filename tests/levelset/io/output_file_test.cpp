@@ -1,0 +1,183 @@
+#include "nephele/levelset/io/output_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <functional>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/support/run_program.h"
+
+namespace nephele {
+namespace {
+
+using test::TemporaryFolder;
+using test::textOf;
+
+void write(const std::string& path, const std::string& text) {
+  std::ofstream(path) << text;
+}
+
+std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(OutputFile, AppearsOnCommitUnderItsName) {
+  const TemporaryFolder folder;
+  OutputFile output(folder.file("a.obj"));
+  write(output.temporaryPath(), "whole");
+  EXPECT_FALSE(std::filesystem::exists(folder.file("a.obj")));
+  output.commit();
+  EXPECT_EQ(textOf(folder.file("a.obj")), "whole");
+  EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+TEST(OutputFile, LeavesNothingWithoutCommitAndKeepsWhatWasThere) {
+  const TemporaryFolder folder;
+  write(folder.file("a.obj"), "before");
+  {
+    const OutputFile output(folder.file("a.obj"));
+    write(output.temporaryPath(), "half");
+  }
+  EXPECT_EQ(textOf(folder.file("a.obj")), "before");
+  EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+TEST(OutputFile, TemporaryHasTheExtensionAndFolderOfTheTarget) {
+  const TemporaryFolder folder;
+  const OutputFile output(folder.file("cloud.0001.vdb"));
+  const std::filesystem::path temporary(output.temporaryPath());
+  EXPECT_EQ(temporary.extension(), ".vdb");
+  EXPECT_EQ(temporary.parent_path().string() + "/cloud.0001.vdb", folder.file("cloud.0001.vdb"));
+}
+
+TEST(OutputFile, TwoOutputsOfOneNameDoNotShareATemporary) {
+  const TemporaryFolder folder;
+  const OutputFile a(folder.file("a.obj")), b(folder.file("a.obj"));
+  EXPECT_NE(a.temporaryPath(), b.temporaryPath());
+}
+
+TEST(OutputFile, HasTheUsualPermissions) {
+  const TemporaryFolder folder;
+  const mode_t mask = umask(027);
+  OutputFile output(folder.file("a.obj"));
+  output.commit();
+  umask(mask);
+  struct stat status {};
+  ASSERT_EQ(stat(folder.file("a.obj").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST(OutputFile, MissingFolderIsNamed) {
+  const TemporaryFolder folder;
+  const std::string message = messageOf([&] { OutputFile output(folder.file("none/a.obj")); });
+  EXPECT_NE(message.find("none does not exist"), std::string::npos) << message;
+}
+
+TEST(OutputFile, FolderAsTargetIsRefused) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkdir(folder.file("a.obj").c_str(), 0777), 0);
+  const std::string message = messageOf([&] { OutputFile output(folder.file("a.obj")); });
+  EXPECT_NE(message.find("it is a folder"), std::string::npos) << message;
+  EXPECT_NE(messageOf([&] { OutputFile output(folder.file("a.obj/")); }).find("it is a folder"),
+            std::string::npos);
+  EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+TEST(OutputFile, FileAsFolderIsRefused) {
+  const TemporaryFolder folder;
+  write(folder.file("file"), "x");
+  const std::string message = messageOf([&] { OutputFile output(folder.file("file/a.obj")); });
+  EXPECT_NE(message.find("is not a folder"), std::string::npos) << message;
+}
+
+TEST(OutputFile, UnwritableFolderIsRefused) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkdir(folder.file("locked").c_str(), 0555), 0);
+  // Nothing is unwritable for the super-user, who therefore becomes nobody for a moment.
+  const bool isSuperUser = geteuid() == 0;
+  if (isSuperUser) {
+    ASSERT_EQ(chmod(folder.file("").c_str(), 0755), 0);
+    ASSERT_EQ(seteuid(65534), 0);
+  }
+  const std::string message = messageOf([&] { OutputFile output(folder.file("locked/a.obj")); });
+  if (isSuperUser) {
+    ASSERT_EQ(seteuid(0), 0);
+  }
+  EXPECT_NE(message.find("Permission denied"), std::string::npos) << message;
+}
+
+TEST(OutputFile, DiscardingRemovesEveryOpenTemporaryButNoFinishedFile) {
+  const TemporaryFolder folder;
+  OutputFile finished(folder.file("a.obj"));
+  finished.commit();
+  const OutputFile b(folder.file("b.obj")), c(folder.file("c.obj"));
+  EXPECT_EQ(folder.entryCount(), 3u);
+  discardAllOutputs();
+  EXPECT_EQ(folder.entryCount(), 1u);
+  EXPECT_TRUE(std::filesystem::exists(folder.file("a.obj")));
+}
+
+TEST(OutputFile, CommitAfterDiscardingSaysThatItFailed) {
+  const TemporaryFolder folder;
+  OutputFile output(folder.file("a.obj"));
+  discardAllOutputs();
+  EXPECT_NE(messageOf([&] { output.commit(); }).find("a.obj"), std::string::npos);
+}
+
+// A limit on the size of files stands in for a full disk: writing fails in the middle with EFBIG for ENOSPC.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    previousHandler_ = std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &previous_);
+    const rlimit limit{bytes, previous_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &previous_);
+    std::signal(SIGXFSZ, previousHandler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit previous_{};
+  void (*previousHandler_)(int);
+};
+
+TEST(OutputFile, FullDiskFailsTheMeshWritersAndLeavesNothing) {
+  Mesh strip;
+  for (int i = 0; i < 5000; ++i) {
+    strip.positions.emplace_back(i, i % 2, 0);
+    if (i > 1)
+      strip.addFace(std::vector<std::uint32_t>{std::uint32_t(i - 2), std::uint32_t(i - 1), std::uint32_t(i)});
+  }
+  for (const char* name : {"a.obj", "a.ply", "a.stl"}) {
+    // 100 bytes: fails when the last buffer is flushed; 80 000 bytes: fails in the middle.
+    for (const rlim_t bytes : {rlim_t{100}, rlim_t{80000}}) {
+      const TemporaryFolder folder;
+      std::string message;
+      {
+        const FullDisk full(bytes);
+        message = messageOf([&] { writeMesh(folder.file(name), strip); });
+      }
+      EXPECT_NE(message.find(folder.file(name)), std::string::npos) << message;
+      EXPECT_NE(message.find("File too large"), std::string::npos) << message;
+      EXPECT_EQ(folder.entryCount(), 0u);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace nephele

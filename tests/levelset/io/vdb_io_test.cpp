@@ -1,0 +1,416 @@
+#include "nephele/levelset/io/vdb_io.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/support/run_program.h"
+#include "tests/support/test_data.h"
+#include "tests/support/test_meshes.h"
+
+namespace nephele::test {
+namespace {
+
+using Class = VdbGridInfo::Class;
+
+std::string errorOf(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+/// A grid of 3 x 3 x 3 bricks: ramp in the middle brick, the constant `inner` in the one after it along x,
+/// `outer` in the others.
+BrickGrid smallGrid(float outer, float inner) {
+  BrickGrid grid;
+  grid.background = outer;
+  grid.firstBrick = {-1, -1, -1};
+  grid.brickCount = {3, 3, 3};
+  grid.table.assign(27, 0);
+  grid.values.assign(3 * BrickGrid::kVolume, outer);
+  std::fill_n(grid.values.begin() + BrickGrid::kVolume, BrickGrid::kVolume, inner);
+  grid.ranges = {Interval::of(outer), Interval::of(inner), Interval{}};
+  grid.table[grid.tableIndex({0, 0, 0})] = 2;
+  grid.table[grid.tableIndex({1, 0, 0})] = 1;
+  float* own = grid.brick(2);
+  for (int z = 0; z < 8; ++z)
+    for (int y = 0; y < 8; ++y)
+      for (int x = 0; x < 8; ++x)
+        own[((z + 1) * 11 + y + 1) * 11 + x + 1] = 0.01f * float(x + 10 * y + 100 * z + 1);
+  grid.ranges[2] = {std::min(outer, 0.01f), std::max(outer, 7.78f)};
+  return grid;
+}
+
+void expectSameSamples(const BrickGrid& a, const BrickGrid& b) {
+  const Vec3i low = min(a.firstBrick, b.firstBrick),
+              high = max(a.firstBrick + a.brickCount, b.firstBrick + b.brickCount);
+  for (int z = low.z * 8 - 2; z < high.z * 8 + 2; ++z)
+    for (int y = low.y * 8 - 2; y < high.y * 8 + 2; ++y)
+      for (int x = low.x * 8 - 2; x < high.x * 8 + 2; ++x)
+        ASSERT_EQ(a.at({x, y, z}), b.at({x, y, z})) << x << " " << y << " " << z;
+}
+
+TEST(VdbIo, LevelSetComesBackBitForBitThroughAFile) {
+  const TemporaryFolder folder;
+  const auto before = toBricks(meshToLevelSet(torusMesh(1.0, 0.4, 64, 32), {.voxelSize = 0.05}));
+  EXPECT_GT(before->at({20, 0, 0}), 0.0f);  // In the tube: positive in code.
+  writeVdbFile(folder.file("a.vdb"), {toVdb(*before, {"surface", Class::levelSet})}, {});
+  const VdbGrid read = readScalarGrid(folder.file("a.vdb"), "surface");
+  EXPECT_LT(describe(read).valueMin, 0.0f);  // In the file: negative inside.
+  EXPECT_FLOAT_EQ(describe(read).background, 0.15f);
+  const auto after = toBricks(read);
+  EXPECT_EQ(before->background, after->background);
+  expectSameSamples(*before, *after);
+}
+
+TEST(VdbIo, BricksHoldTheirNeighboursBorderSamples) {
+  // Every stored sample of every brick equals the grid's sample at its voxel.
+  const auto grid = toBricks(meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.08}));
+  for (int bz = 0; bz < grid->brickCount.z; ++bz)
+    for (int by = 0; by < grid->brickCount.y; ++by)
+      for (int bx = 0; bx < grid->brickCount.x; ++bx) {
+        const Vec3i b = grid->firstBrick + Vec3i{bx, by, bz};
+        const float* samples = grid->brick(grid->poolIndex(b));
+        for (int z = 0; z < 11; ++z)
+          for (int y = 0; y < 11; ++y)
+            for (int x = 0; x < 11; ++x)
+              ASSERT_EQ(samples[(z * 11 + y) * 11 + x],
+                        grid->at({b.x * 8 + x - 1, b.y * 8 + y - 1, b.z * 8 + z - 1}));
+      }
+}
+
+TEST(VdbIo, FogKeepsItsValuesAndItsConstantBricksAreTiles) {
+  const TemporaryFolder folder;
+  const BrickGrid bricks = smallGrid(0.0f, 2.5f);
+  writeVdbFile(folder.file("fog.vdb"), {toVdb(bricks, {"density", Class::fogVolume})}, {});
+  const VdbGrid read = readScalarGrid(folder.file("fog.vdb"));
+  const VdbGridInfo info = describe(read);
+  EXPECT_EQ(info.name, "density");
+  EXPECT_EQ(info.gridClass, Class::fogVolume);
+  EXPECT_EQ(info.background, 0.0f);
+  EXPECT_EQ(info.activeVoxels, 1024u);  // 8^3 of the ramp, 8^3 of the tile.
+  EXPECT_FLOAT_EQ(info.valueMax, 7.78f);
+  expectSameSamples(bricks, *toBricks(read));
+}
+
+TEST(VdbIo, FogIsNeverNegativeInFiles) {
+  BrickGrid bricks = smallGrid(0.0f, 1.0f);
+  bricks.brick(2)[12 * 11 + 1] = -3.0f;
+  const VdbGridInfo info = describe(toVdb(bricks, {"density", Class::fogVolume}));
+  EXPECT_GT(info.valueMin, 0.0f);
+  EXPECT_EQ(info.activeVoxels, 1023u);
+}
+
+TEST(VdbIo, LevelSetInteriorIsAnInactiveTileOfTheOtherSign) {
+  const VdbGrid grid = meshToLevelSet(icosphere(1.0, 4), {.voxelSize = 0.02});
+  const auto bricks = toBricks(grid);
+  EXPECT_FLOAT_EQ(bricks->at({0, 0, 0}), 0.06f);
+  EXPECT_FLOAT_EQ(bricks->at({100, 0, 0}), -0.06f);
+  const VdbGridInfo again = describe(toVdb(*bricks, {"surface", Class::levelSet}));
+  EXPECT_EQ(again.activeVoxels, describe(grid).activeVoxels);
+  EXPECT_LT(again.valueMax, 0.06f);
+}
+
+TEST(VdbIo, TransformsComeBack) {
+  const TemporaryFolder folder;
+  BrickGrid bricks = smallGrid(0.0f, 1.0f);
+  for (const Mat3f& linear : {Mat3f::scaling(0.25f), Mat3f::rotation({1, 2, 3}, 0.7f) * Mat3f::scaling(0.5f),
+                              Mat3f{{0.5f, 0.1f, 0.0f, 0.0f, 0.25f, 0.0f, -0.1f, 0.0f, 1.0f}}}) {
+    bricks.indexToWorld = {linear, {3, -4, 5}};
+    writeVdbFile(folder.file("t.vdb"), {toVdb(bricks, {"density", Class::fogVolume})}, {});
+    const VdbGrid read = readScalarGrid(folder.file("t.vdb"));
+    const auto back = toBricks(read);
+    for (int i = 0; i < 9; ++i)
+      EXPECT_NEAR(back->indexToWorld.linear.m[std::size_t(i)], linear.m[std::size_t(i)], 1e-6f);
+    EXPECT_NEAR(length(back->indexToWorld.translation - Vec3f(3, -4, 5)), 0.0f, 1e-6f);
+    EXPECT_NEAR(back->voxelSize, std::cbrt(determinant(linear)), 1e-6f);
+    EXPECT_EQ(describe(read).uniform, linear == Mat3f::scaling(0.25f));
+    const Vec3f p(1.5f, 2.5f, -3.5f);
+    EXPECT_NEAR(length(back->worldToIndex(back->indexToWorld(p)) - p), 0.0f, 1e-5f);
+  }
+}
+
+TEST(VdbIo, MetadataIsWrittenToEveryGrid) {
+  const TemporaryFolder folder;
+  const BrickGrid bricks = smallGrid(0.0f, 1.0f);
+  writeVdbFile(
+      folder.file("m.vdb"),
+      {toVdb(bricks, {"density", Class::fogVolume}), toVdb(bricks, {"heat", Class::fogVolume, true})},
+      {{"creator", "nephele"}, {"seed", "7"}});
+  for (const VdbGrid& grid : readVdbFile(folder.file("m.vdb"))) {
+    const VdbGridInfo info = describe(grid);
+    EXPECT_EQ(info.metadata.at("creator"), "nephele");
+    EXPECT_EQ(info.metadata.at("seed"), "7");
+    EXPECT_EQ(info.metadata.at("class"), "fog volume");
+    EXPECT_EQ(info.halfFloat, info.name == "heat");
+  }
+  EXPECT_THROW(writeVdbFile(folder.file("m.vdb"), {toVdb(bricks, {"a"}), toVdb(bricks, {"a"})}, {}), Error);
+}
+
+TEST(VdbIo, HalfFloatsRoundToElevenBits) {
+  const TemporaryFolder folder;
+  const BrickGrid bricks = smallGrid(0.0f, 1.0f);
+  writeVdbFile(folder.file("h.vdb"), {toVdb(bricks, {"density", Class::fogVolume, true})}, {});
+  const auto back = toBricks(readScalarGrid(folder.file("h.vdb")));
+  EXPECT_NE(back->at({3, 4, 5}), bricks.at({3, 4, 5}));
+  EXPECT_NEAR(back->at({3, 4, 5}), bricks.at({3, 4, 5}), bricks.at({3, 4, 5}) / 2048);
+}
+
+TEST(VdbIo, RefusesToMakeWhatFilesMustNotHold) {
+  EXPECT_NE(errorOf([] {
+              toVdb(smallGrid(1.0f, 2.0f), {"density", Class::fogVolume});
+            }).find("background"),
+            std::string::npos);
+  EXPECT_NE(errorOf([] {
+              toVdb(smallGrid(1.0f, 2.0f), {"surface", Class::levelSet});
+            }).find("background"),
+            std::string::npos);
+  BrickGrid bad = smallGrid(0.0f, 1.0f);
+  bad.brick(2)[12 * 11 + 3] = NAN;
+  EXPECT_NE(errorOf([&] {
+              toVdb(bad, {"density", Class::fogVolume});
+            }).find("not finite"),
+            std::string::npos);
+}
+
+struct KnownVolume {
+  const char* file;
+  const char* grid;
+  const char* type;
+  Class gridClass;
+  std::uint64_t active;
+  Vec3i size;
+  float voxel, low, high;
+};
+
+TEST(VdbIo, ReadsVolumesMadeElsewhere) {
+  // Counts as the test data's README measured them with other tools.
+  const KnownVolume known[] = {
+      {"bifrost_torus_fog.vdb",
+       "voxel_fog_density",
+       "float",
+       Class::fogVolume,
+       2450,
+       {22, 9, 22},
+       0.4032f,
+       0.0268698f,
+       100},
+      {"blender_fluid_5_grids.vdb",
+       "density",
+       "float",
+       Class::fogVolume,
+       26912,
+       {29, 29, 32},
+       0.4209f,
+       0,
+       0.972656f},
+      {"cube_levelset.vdb",
+       "ls_cube",
+       "float",
+       Class::levelSet,
+       1452218,
+       {225, 225, 225},
+       0.05f,
+       -0.0999756f,
+       0.141479f},
+      {"dragon_small_fog.vdb",
+       "density",
+       "float",
+       Class::fogVolume,
+       19660,
+       {70, 49, 31},
+       0.1f,
+       2.89331e-05f,
+       1},
+      {"half_spot_multi_grid.vdb",
+       "distanceField",
+       "float",
+       Class::levelSet,
+       684983,
+       {130, 130, 41},
+       0.08467f,
+       -1.23f,
+       0.507629f},
+      {"smoke_double_fog.vdb", "density", "float", Class::fogVolume, 524288, {128, 64, 64}, 1, 0, 1},
+      {"smoke_fog.vdb",
+       "density",
+       "float",
+       Class::fogVolume,
+       1049275,
+       {111, 222, 112},
+       0.4762f,
+       1.00136e-05f,
+       5.71484f},
+      {"teapot_cloud.nvdb", "density", "float", Class::fogVolume, 1963736, {267, 134, 178}, 0.00767f, 0, 1},
+      {"tiles_no_class.vdb", "temperature", "float", Class::unknown, 1000000, {100, 100, 100}, 1, 1, 1},
+      {"wdas_cloud_sixteenth_fog.vdb",
+       "density",
+       "float",
+       Class::fogVolume,
+       415642,
+       {126, 86, 154},
+       3.333f,
+       0,
+       1},
+  };
+  for (const KnownVolume& k : known) {
+    SCOPED_TRACE(k.file);
+    const std::string path = sharedData(std::string("volumes/") + k.file);
+    NEPHELE_REQUIRE_SHARED_DATA(path);
+    const VdbGrid grid = readScalarGrid(path);
+    const VdbGridInfo info = describe(grid);
+    EXPECT_EQ(info.name, k.grid);
+    EXPECT_EQ(info.type, k.type);
+    EXPECT_EQ(info.gridClass, k.gridClass);
+    EXPECT_EQ(info.activeVoxels, k.active);
+    EXPECT_EQ(info.indexMax - info.indexMin + Vec3i(1, 1, 1), k.size);
+    EXPECT_NEAR(info.voxelSize.x, k.voxel, 1e-4f * k.voxel + 5e-6f);
+    const bool rangeIsKnown = std::string(k.file) != "teapot_cloud.nvdb";
+    if (rangeIsKnown) {
+      EXPECT_NEAR(info.valueMin, k.low, 1e-5f);
+      EXPECT_NEAR(info.valueMax, k.high, 1e-4f);
+    }
+    // Bricks hold the same extremes: the sign turned for level sets.
+    const auto bricks = toBricks(grid);
+    const float sign = k.gridClass == Class::levelSet ? -1.0f : 1.0f;
+    EXPECT_EQ(bricks->background, sign * info.background);
+    Interval range = Interval::of(bricks->background);
+    for (const Interval& r : bricks->ranges) range = range.hull(r);
+    EXPECT_TRUE(range.contains(sign * info.valueMin) && range.contains(sign * info.valueMax));
+  }
+}
+
+TEST(VdbIo, DescribesGridsThatHoldNoNumbers) {
+  for (const auto& [file, grid, type, active] : {std::tuple{"sphere_colour_vec3.vdb", "Cd", "vec3s", 9047u},
+                                                 {"sphere_points.vdb", "points", "ptdataidx32", 1178u},
+                                                 {"velocity_vec3_tiles.vdb", "vel", "vec3s", 1000000u}}) {
+    const std::string path = sharedData(std::string("volumes/") + file);
+    NEPHELE_REQUIRE_SHARED_DATA(path);
+    const VdbGridInfo info = describe(readVdbFile(path).at(0));
+    EXPECT_EQ(info.name, grid);
+    EXPECT_EQ(info.type, type);
+    EXPECT_EQ(info.activeVoxels, active);
+    const std::string message = errorOf([&] { readScalarGrid(path); });
+    EXPECT_NE(message.find(path), std::string::npos) << message;
+    EXPECT_NE(message.find(grid), std::string::npos) << message;
+    EXPECT_NE(message.find(type), std::string::npos) << message;
+  }
+}
+
+TEST(VdbIo, MissingNameListsTheGridsThatAreThere) {
+  const std::string path = sharedData("volumes/blender_fluid_5_grids.vdb");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  EXPECT_EQ(readVdbFile(path).size(), 5u);
+  EXPECT_EQ(describe(readScalarGrid(path, "flame")).name, "flame");
+  const std::string message = errorOf([&] { readScalarGrid(path, "densty"); });
+  for (const char* part : {"densty", "density", "flame", "shadow", "temperature", "velocity"})
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  EXPECT_NE(errorOf([&] { readScalarGrid(path, "velocity"); }).find("vec3s"), std::string::npos);
+}
+
+TEST(VdbIo, AnEmptyGridReadsAsBackground) {
+  const std::string path = sharedData("volumes/empty_grid.vdb");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  const VdbGrid grid = readScalarGrid(path);
+  EXPECT_EQ(describe(grid).activeVoxels, 0u);
+  const auto bricks = toBricks(grid);
+  EXPECT_EQ(bricks->at({1, 2, 3}), 0.0f);
+  EXPECT_EQ(bricks->table.size(), 0u);
+}
+
+TEST(VdbIo, BadFilesNameThemselvesAndWhatIsWrong) {
+  for (const auto& [file, part] : {std::pair{"git_lfs_pointer.vdb", "Git LFS pointer"},
+                                   {"truncated.vdb", "cut short"},
+                                   {"truncated_reads_silently.vdb", "cut short"},
+                                   {"old_version_0_28.nvdb", "0.0.28"}}) {
+    const std::string path = sharedData(std::string("malformed/") + file);
+    NEPHELE_REQUIRE_SHARED_DATA(path);
+    const std::string message = errorOf([&] { readVdbFile(path); });
+    EXPECT_EQ(message.find(path), 0u) << message;
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+}
+
+TEST(VdbIo, FilesCutAnywhereAreRefused) {
+  const TemporaryFolder folder;
+  writeVdbFile(folder.file("whole.vdb"), {meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.1})}, {});
+  const std::string whole = textOf(folder.file("whole.vdb"));
+  for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 97) {
+    std::ofstream(folder.file("cut.vdb"), std::ios::binary) << whole.substr(0, length);
+    EXPECT_THROW(readVdbFile(folder.file("cut.vdb")), Error) << length << " of " << whole.size();
+  }
+  EXPECT_THROW(readVdbFile(folder.file("missing.vdb")), Error);
+  EXPECT_THROW(readVdbFile(folder.file("")), Error);
+}
+
+TEST(VdbIo, DamagedBytesAreAnErrorOrOtherValuesButNothingWorse) {
+  // OpenVDB 10.0.1 by itself writes past its buffers on many such files.
+  const TemporaryFolder folder;
+  writeVdbFile(folder.file("whole.vdb"), {meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.1})}, {});
+  const std::string whole = textOf(folder.file("whole.vdb"));
+  // From the transform on: what stands before are names and numbers, whose lengths OpenVDB allocates as they
+  // are.
+  const std::size_t tree = whole.find("UniformScaleMap");
+  ASSERT_NE(tree, std::string::npos);
+  int refused = 0;
+  for (unsigned seed = 0; seed < 150; ++seed) {
+    std::mt19937 random(seed);
+    std::string damaged = whole;
+    for (int k = 0; k < 3; ++k) damaged[tree + random() % 2500] = char(random());
+    std::ofstream(folder.file("damaged.vdb"), std::ios::binary) << damaged;
+    try {
+      describe(readScalarGrid(folder.file("damaged.vdb")));
+    } catch (const Error& e) {
+      ++refused;
+      EXPECT_NE(std::string(e.what()), "");
+    }
+  }
+  EXPECT_GT(refused, 50);
+}
+
+TEST(VdbIo, NanoVdbFilesCutAnywhereAreRefused) {
+  const std::string path = sharedData("volumes/teapot_cloud.nvdb");
+  NEPHELE_REQUIRE_SHARED_DATA(path);
+  const TemporaryFolder folder;
+  const std::string whole = textOf(path);
+  for (const double share : {0.0, 1e-5, 5e-5, 1.3e-4, 2e-4, 0.3, 0.999}) {
+    std::ofstream(folder.file("cut.nvdb"), std::ios::binary)
+        << whole.substr(0, std::size_t(share * double(whole.size())));
+    EXPECT_THROW(readVdbFile(folder.file("cut.nvdb")), Error) << share;
+  }
+}
+
+TEST(VdbIo, AFullDiskLeavesAnErrorAndNoFile) {
+  // A limit on file size stands in for a full disk: writes beyond it fail.
+  const TemporaryFolder folder;
+  const VdbGrid grid = meshToLevelSet(icosphere(1.0, 4), {.voxelSize = 0.03});
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto oldHandler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{20000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  const std::string message = errorOf([&] { writeVdbFile(folder.file("full.vdb"), {grid}, {}); });
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, oldHandler);
+  EXPECT_NE(message.find("full.vdb"), std::string::npos) << message;
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
+TEST(VdbIo, AnUnwritableTargetIsNamed) {
+  const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"density", Class::fogVolume});
+  const std::string message = errorOf([&] { writeVdbFile("/no/such/folder/a.vdb", {grid}, {}); });
+  EXPECT_NE(message.find("/no/such/folder"), std::string::npos) << message;
+}
+
+}  // namespace
+}  // namespace nephele::test

@@ -1,0 +1,96 @@
+// A volume that is lit once and looked at many times.
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/march/raymarch.h"
+#include "tests/support/density.h"
+
+namespace nephele {
+namespace {
+
+const Lights kLights{{{"sun", directionTowards(60, 30), {3, 3, 3}}}, {0.1f, 0.2f, 0.3f}};
+
+Camera cameraAt(const RenderVolume& volume, float azimuth) {
+  return Camera::framing(volume.outline(), azimuth, 10, {24, 18});
+}
+
+void expectSame(const Image& a, const Image& b) {
+  ASSERT_EQ(a.channels.size(), b.channels.size());
+  for (std::size_t c = 0; c != a.channels.size(); ++c) {
+    EXPECT_EQ(a.channels[c].name, b.channels[c].name);
+    EXPECT_EQ(a.channels[c].values, b.channels[c].values) << a.channels[c].name;
+  }
+}
+
+TEST(LitVolume, MakesThePicturesOfRenderImage) {
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Medium medium{30.0f};
+  RenderOptions options;
+  options.aovs = {"Z", "light"};
+  const LitVolume lit(volume, medium, kLights, options.octaves);
+  for (const float azimuth : {0.0f, 100.0f, 0.0f}) {
+    const Camera camera = cameraAt(volume, azimuth);
+    expectSame(lit.render(camera, options).image,
+               renderImage(volume, medium, kLights, camera, options).image);
+  }
+}
+
+TEST(LitVolume, MayBeLitAgain) {
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Medium medium{30.0f};
+  const RenderOptions options;
+  const Camera camera = cameraAt(volume, 20);
+  Lights moved = kLights;
+  moved.suns[0].direction = directionTowards(180, 20);
+  Lights other = moved;
+  other.sky = {0.5f, 0, 0};
+  // One light after another, as frames follow each other.
+  LitVolume lit(volume, medium, kLights, options.octaves);
+  for (const Lights& lights : {moved, other, Lights{kLights.suns, {}}, moved}) {
+    lit = lit.underOther(lights);
+    expectSame(lit.render(camera, options).image, renderImage(volume, medium, lights, camera, options).image);
+  }
+}
+
+TEST(LitVolume, AnEmptyVolumeMakesPicturesOfZeros) {
+  const RenderVolume volume(test::ball(1.0f, 0.25f, 0.0f));
+  const RenderOptions options;
+  const Image image =
+      LitVolume(volume, {}, kLights, options.octaves).render(cameraAt(volume, 0), options).image;
+  for (const char* name : {"R", "G", "B", "A"})
+    for (const float value : image.channel(name).values) EXPECT_EQ(value, 0.0f);
+}
+
+TEST(LitVolume, RefusesOctavesOtherThanItsOwn) {
+  const RenderVolume volume(test::ball(1.0f, 0.25f));
+  RenderOptions options;
+  const LitVolume lit(volume, {}, kLights, options.octaves);
+  ++options.octaves.count;
+  EXPECT_THROW(lit.render(cameraAt(volume, 0), options), Error);
+}
+
+TEST(LitVolume, HoldsTheShadowsOfObjectsFromPictureToPicture) {
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Medium medium{10.0f};
+  Mesh wall;
+  wall.positions = {{2, -3, -3}, {2, 3, -3}, {2, 0, 3}};
+  wall.addFace(std::array<std::uint32_t, 3>{0, 1, 2});
+  RenderOptions options;
+  options.surfaces = std::make_shared<const Surfaces>(std::vector<SurfaceObject>{{wall}});
+  LitVolume lit(volume, medium, kLights, options.octaves, silent(), options.surfaces);
+  Lights moved = kLights;
+  moved.suns[0].direction = directionTowards(100, 0);
+  for (const Lights& lights : {kLights, moved}) {
+    lit = lit.underOther(lights);
+    for (const float azimuth : {0.0f, 100.0f})
+      expectSame(lit.render(cameraAt(volume, azimuth), options).image,
+                 renderImage(volume, medium, lights, cameraAt(volume, azimuth), options).image);
+  }
+  options.surfaces.reset();
+  EXPECT_THROW(lit.render(cameraAt(volume, 0), options), Error);
+}
+
+}  // namespace
+}  // namespace nephele

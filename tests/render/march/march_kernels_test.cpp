@@ -1,0 +1,134 @@
+#include "nephele/render/march/march_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "nephele/render/light/light_volume.h"
+#include "nephele/render/volume/render_volume.h"
+#include "tests/support/density.h"
+#include "tests/support/each_target.h"
+#include "tests/support/march_scene.h"
+
+namespace nephele {
+namespace {
+
+LatticeRay through(const Affine& map, const Vec3i& firstBrick, const Vec3f& origin, const Vec3f& direction) {
+  return {map(origin) - Vec3f(firstBrick * 8), map.linear * direction};
+}
+
+TEST(MarchKernels, AgreeWithTheScalarLoop) {
+  const auto grid = test::densityGrid(test::voxels(0.1f), {-20, -20, -20}, {20, 20, 20}, [](const Vec3f& p) {
+    return std::fmax(0.0f, std::sin(3 * p.x) * std::cos(4 * p.y) + std::sin(5 * p.z));
+  });
+  const RenderVolume volume(grid);
+  const test::SunColumns sun({volume, {0.3f, 0.8f, 0.4f}});
+  const LightVolume& light = sun.light;
+  std::vector<float> sky(5 * 4 * 3);
+  for (std::size_t i = 0; i != sky.size(); ++i) sky[i] = 0.5f + 0.4f * std::sin(float(i));
+  const Affine toSky{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
+
+  MarchScene scene = test::sceneOf(volume, sun);
+  // Three colours of the sun, of which green has none, and of the sky.
+  scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
+  scene.scatteredSize = {5, 4, 2};
+  scene.octaves = 5;
+  for (int n = 0; n != 5; ++n) scene.attenuation[n] = 1.0f / float(1 + n);
+  scene.colours = 3;
+  scene.step = 0.1f;
+  scene.leastStep = 0.0125f;
+
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != 300; ++i) {
+    const Vec3f direction = normalize(Vec3f{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)});
+    const Vec3f origin =
+        Vec3f{std::sin(i * 0.9f), std::cos(i * 1.9f), std::sin(i * 0.4f)} * 0.8f - direction * 1.2f;
+    MarchRay ray;
+    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, direction);
+    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, direction);
+    ray.scattered = through(toSky, {}, origin, direction);
+    ray.length = 2.5f;
+    ray.jitter = 0.3f;
+    for (int c = 0; c != 3; ++c)
+      for (int n = 0; n != 5; ++n) ray.weight[0][c][n] = 0.1f * float(c + 1) / float(n + 1);
+    rays.push_back(ray);
+  }
+  for (const float extinction : {0.05f, 2.0f, 40.0f}) {
+    scene.extinction = extinction;
+    std::vector<MarchResult> expected(rays.size());
+    marchRaysScalar(scene, rays, expected);
+    test::forEachTarget([&] {
+      std::vector<MarchResult> results(rays.size());
+      marchRays(scene, rays, results);
+      for (std::size_t i = 0; i != rays.size(); ++i) {
+        // The vectors notice only every 32 samples that nothing is left to see.
+        const float seen = std::exp(-expected[i].opticalDepth);
+        ASSERT_NEAR(std::exp(-results[i].opticalDepth), seen, 1.1e-4f);
+        for (int c = 0; c != 3; ++c) ASSERT_NEAR(results[i].sky[c], expected[i].sky[c], 2e-4f);
+        ASSERT_EQ(std::isinf(results[i].distance), std::isinf(expected[i].distance));
+        if (std::isfinite(results[i].distance)) {
+          ASSERT_NEAR(results[i].distance, expected[i].distance, 1e-4f);
+        }
+        for (int c = 0; c != 3; ++c)
+          ASSERT_NEAR(results[i].suns[0][c], expected[i].suns[0][c], 2e-4f) << i << " " << c;
+      }
+    });
+  }
+}
+
+TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
+  const auto grid = test::ball(1.0f, 0.1f);
+  const RenderVolume volume(grid);
+  const test::SunColumns sun({volume, {0, 0, 1}});
+  const LightVolume& light = sun.light;
+  MarchScene scene = test::sceneOf(volume, sun);
+  scene.extinction = 1.5f;
+  scene.step = 0.05f;
+  const HoldoutCurve::Knot knots[] = {{8.5f, 0}, {9.0f, 0.4f}, {9.0f, 0.9f}, {9.3f, 1.0f}};
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != 40; ++i) {
+    MarchRay ray{};
+    const Vec3f origin{-0.9f + 0.045f * float(i), 0.1f, 2};
+    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, {0, 0, -1});
+    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, {0, 0, -1});
+    ray.start = 7;
+    ray.length = 4;
+    ray.weight[0][0][0] = 1;
+    if (i % 2 == 0) ray.holdout = {knots, std::size(knots)};
+    rays.push_back(ray);
+  }
+  std::vector<MarchResult> expected(rays.size());
+  marchRaysScalar(scene, rays, expected);
+  test::forEachTarget([&] {
+    std::vector<MarchResult> results(rays.size()), unrecorded(rays.size());
+    std::vector<MarchRecord> records(rays.size());
+    marchRays(scene, rays, results, records);
+    marchRays(scene, rays, unrecorded);
+    for (std::size_t i = 0; i != rays.size(); ++i) {
+      EXPECT_EQ(results[i].suns[0][0], unrecorded[i].suns[0][0]);
+      EXPECT_EQ(results[i].opticalDepth, unrecorded[i].opticalDepth);
+      EXPECT_NEAR(results[i].suns[0][0], expected[i].suns[0][0], 1e-5f);
+      const bool isHeld = i % 2 == 0;
+      const float opacity = isHeld ? results[i].heldOpacity[0] : 1 - std::exp(-results[i].opticalDepth);
+      if (isHeld) {
+        EXPECT_NEAR(opacity, expected[i].heldOpacity[0], 1e-5f);
+      }
+      if (std::isfinite(expected[i].distance)) {
+        EXPECT_NEAR(results[i].distance, expected[i].distance, 1e-4f);
+      }
+      // The record ends with what the result says, its steps one behind the other.
+      ASSERT_FALSE(records[i].marks.empty());
+      EXPECT_EQ(records[i].marks.back().result.suns[0][0], results[i].suns[0][0]);
+      EXPECT_EQ(records[i].marks.back().stepCount, records[i].steps.size());
+      EXPECT_NEAR(records[i].steps.empty() ? 0 : records[i].steps.back().opacity, opacity, 1e-5f);
+      for (std::size_t k = 1; k < records[i].steps.size(); ++k) {
+        EXPECT_GE(records[i].steps[k].begin, records[i].steps[k - 1].end - 1e-4f);
+        EXPECT_GE(records[i].steps[k].opacity, records[i].steps[k - 1].opacity);
+      }
+    }
+  });
+}
+
+}  // namespace
+}  // namespace nephele

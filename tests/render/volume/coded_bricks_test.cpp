@@ -1,0 +1,121 @@
+#include "nephele/render/volume/coded_bricks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "nephele/levelset/grid/brick_grid.h"
+#include "tests/support/density.h"
+#include "tests/support/each_target.h"
+
+namespace nephele {
+namespace {
+
+constexpr int kWidth = CodedBricks::kWidth;
+
+std::size_t nodeOf(const Vec3i& node) {
+  return std::size_t((node.z * kWidth + node.y) * kWidth + node.x);
+}
+
+template <class Check>
+void forEachNode(Check&& check) {
+  for (int z = 0; z != kWidth; ++z)
+    for (int y = 0; y != kWidth; ++y)
+      for (int x = 0; x != kWidth; ++x) check(Vec3i{x, y, z});
+}
+
+// One brick of `value` at its nodes.
+template <class Value>
+std::vector<float> brickOf(Value&& value) {
+  std::vector<float> nodes(CodedBricks::kNodes);
+  forEachNode([&](const Vec3i& node) { nodes[nodeOf(node)] = value(node); });
+  return nodes;
+}
+
+constexpr std::int32_t kOne[] = {0};
+
+TEST(CodedBricks, AreHalfAUnitOffAtMost) {
+  // A unit is 1 / 57343 of the brick's largest value.
+  for (const float scale : {1e-20f, 0.01f, 1.0f, 3e5f}) {
+    const std::vector<float> nodes = brickOf([&](const Vec3i& n) {
+      return scale * std::fabs(std::sin(float(7 * n.x + 3 * n.y) + 0.3f * float(n.z)));
+    });
+    const float most = *std::max_element(nodes.begin(), nodes.end());
+    test::forEachTarget([&] {
+      const CodedBricks coded(nodes, kOne);
+      forEachNode([&](const Vec3i& node) {
+        // The quotient and the product are rounded, too.
+        ASSERT_NEAR(coded.at(0, node), nodes[nodeOf(node)], most * (0.5f / 57343 + 2e-7f));
+      });
+    });
+  }
+}
+
+TEST(CodedBricks, KeepZerosAndBricksOfOneValue) {
+  const CodedBricks mixed(brickOf([](const Vec3i& n) { return n.x < 4 ? 0.0f : 0.7f * float(n.y) - 2; }),
+                          kOne);
+  forEachNode([&](const Vec3i& node) {
+    if (node.x < 4) {
+      ASSERT_EQ(mixed.at(0, node), 0.0f);
+    }
+  });
+  for (const float value : {0.0f, 0.3f, 1.0f, 123.4f}) {
+    const CodedBricks constant(brickOf([&](const Vec3i&) { return value; }), kOne);
+    forEachNode([&](const Vec3i& node) { ASSERT_FLOAT_EQ(constant.at(0, node), value); });
+  }
+}
+
+TEST(CodedBricks, CoarsenWhereMuchIsBelowZero) {
+  // Down to -1 / 7 of the largest value at no loss; where more is below 0, 8192 units reach there.
+  const CodedBricks coded(brickOf([](const Vec3i& n) { return n.x == 0 ? -4.0f : float(n.z) / 8; }), kOne);
+  forEachNode([&](const Vec3i& node) {
+    ASSERT_NEAR(coded.at(0, node), node.x == 0 ? -4.0f : float(node.z) / 8, 0.51f * 4 / 8192);
+  });
+}
+
+TEST(CodedBricks, StayFiniteWhateverTheyHold) {
+  const float huge = std::numeric_limits<float>::max(), infinite = std::numeric_limits<float>::infinity();
+  test::forEachTarget([&] {
+    for (const float value : {huge, infinite}) {
+      const CodedBricks coded(brickOf([&](const Vec3i& n) { return n.x == 3 ? value : 1.0f; }), kOne);
+      EXPECT_NEAR(coded.at(0, {3, 0, 0}), 1e30f, 1e25f);
+      EXPECT_EQ(coded.at(0, {2, 0, 0}), 0.0f);
+    }
+    const CodedBricks tiny(brickOf([](const Vec3i&) { return 1e-38f; }), kOne);
+    EXPECT_EQ(tiny.at(0, {1, 2, 3}), 0.0f);
+  });
+}
+
+TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
+  const auto grid = test::densityGrid(test::voxels(0.1f), {-20, -20, -20}, {20, 20, 20}, [](const Vec3f& p) {
+    return std::sin(3 * p.x) * std::cos(4 * p.y) + std::sin(5 * p.z);
+  });
+  const CodedBricks expected(*grid);
+  // The same nodes, brick by brick.
+  std::vector<float> nodes;
+  for (std::size_t pool = 0; pool != grid->poolSize(); ++pool)
+    for (int z = 0; z != kWidth; ++z)
+      for (int y = 0; y != kWidth; ++y) {
+        const float* row = grid->brick(std::int32_t(pool)) + sampleOffset(0, y, z);
+        nodes.insert(nodes.end(), row, row + kWidth);
+      }
+  test::forEachTarget([&] {
+    const CodedBricks coded(*grid), inPlace(nodes, grid->table);
+    for (std::size_t place = 0; place != grid->table.size(); ++place) {
+      ASSERT_EQ(coded.entries()[place].first, expected.entries()[place].first);
+      ASSERT_EQ(coded.entries()[place].unit, expected.entries()[place].unit);
+      ASSERT_EQ(inPlace.entries()[place].unit, expected.entries()[place].unit);
+      const float* pairs = expected.pairs() + expected.entries()[place].first;
+      const std::size_t bytes = CodedBricks::kPairs * sizeof(float);
+      ASSERT_EQ(std::memcmp(coded.pairs() + coded.entries()[place].first, pairs, bytes), 0);
+      ASSERT_EQ(std::memcmp(inPlace.pairs() + inPlace.entries()[place].first, pairs, bytes), 0);
+    }
+  });
+  EXPECT_EQ(expected.memoryBytes(), CodedBricks::estimateBytes(*grid));
+}
+
+}  // namespace
+}  // namespace nephele
