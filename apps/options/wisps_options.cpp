@@ -6,7 +6,7 @@
 
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/io/point_io.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/shape/shapes.h"

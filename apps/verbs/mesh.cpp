@@ -7,6 +7,7 @@
 #include "apps/app.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_distance.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/modeling/base/error.h"

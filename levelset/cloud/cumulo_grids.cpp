@@ -22,6 +22,7 @@
 
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/cloud/renormalise.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_memo.h"
 #include "nephele/levelset/grid/brick_samples.h"
 #include "nephele/levelset/grid/grid_field.h"

@@ -10,7 +10,7 @@
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
 
 namespace nephele {
 

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "nephele/levelset/grid/grid_field.h"
-
+#include "nephele/levelset/grid/bake.h"
 namespace nephele {
 
 /// How far a distance must hold outside and inside the surface, world units.

@@ -8,7 +8,7 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {

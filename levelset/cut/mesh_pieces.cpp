@@ -18,6 +18,7 @@
 #include <numeric>
 
 #include "nephele/levelset/cut/detail/carved_pieces.h"
+#include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 

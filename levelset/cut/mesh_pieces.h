@@ -1,30 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/shape/knives.h"
 
 namespace nephele {
-
-/// What a closed mesh would weigh if it were solid, of density 1.
-struct MassProperties {
-  /// World units cubed; negative if the mesh is inside out.
-  double volume = 0.0;
-  double area = 0.0;
-  /// Centre of mass. Of a mesh without volume: the middle of its positions.
-  Vec3d centroid{};
-  /// About the centroid, row-major and symmetric: I = integral of |r|^2 1 - r r^T.
-  std::array<double, 9> inertia{};
-};
-
-/// Integrals over the solid by the divergence theorem, exact for flat faces up to rounding. Polygons count as
-/// fans from their first corner. Cost: one pass.
-MassProperties massProperties(const Mesh& mesh);
 
 /// A plane with hills as a triangulated height field: the hills of `roughKnife`, read on the plane at the
 /// points of a lattice. Its sides at half a kerf are raised by that times the secant of the slope.

@@ -8,6 +8,7 @@
 
 #include "nephele/levelset/cut/mesh_pieces.h"
 #include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/mesh/mass_properties.h"
 
 /// Pieces with names, and pieces that are cut again.
 namespace nephele {

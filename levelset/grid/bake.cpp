@@ -12,6 +12,8 @@
 // then nothing inside the band is lost on its far faces. Limit: a feature so thin that samples miss it is
 // missed.
 
+#include "nephele/levelset/grid/bake.h"
+
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
 

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_grid.h"
-#include "nephele/levelset/grid/grid_field.h"
 
 /// Sparse grids while they are made: bricks without the borders that interpolation reads. For the
 /// implementation of bakes.

@@ -6,6 +6,8 @@
 //
 // Limits: OpenVDB's merging can leave edges with more than two faces, and vertices are smoothed off the zero
 // of the interpolant; where a closed manifold is needed, take marching cubes.
+#include "nephele/levelset/mesh/adaptive_mesh.h"
+
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <cmath>
@@ -14,7 +16,6 @@
 #include <vector>
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
-#include "nephele/levelset/mesh/marching_cubes.h"
 
 namespace nephele {
 

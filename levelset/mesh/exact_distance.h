@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/field/field.h"
 

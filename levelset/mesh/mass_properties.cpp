@@ -3,8 +3,8 @@
 // Each triangle and the middle of the box span a tetrahedron; signed, they add up to the solid. The integral
 // of x x^T over a tetrahedron with a corner at the origin and the others a, b, c is det(a, b, c) / 120 (a a^T
 // + b b^T + c c^T + s s^T) with s = a + b + c.
-#include "nephele/levelset/cut/mesh_pieces.h"
 
+#include "nephele/levelset/mesh/mass_properties.h"
 namespace nephele {
 
 MassProperties massProperties(const Mesh& mesh) {

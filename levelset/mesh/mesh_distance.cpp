@@ -27,7 +27,7 @@
 #include "nephele/levelset/grid/grid_kernels.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/mesh/mesh_band.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele {

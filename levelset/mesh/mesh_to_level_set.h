@@ -27,22 +27,6 @@ VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
 /// of two.
 double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options);
 
-struct MeshDistanceOptions {
-  /// Finest voxel, world units: used within a few voxels of the surface.
-  double voxelSize = 0.0;
-  /// World units outside (inside) the surface up to which the distance must hold.
-  double exteriorBand = 0.0;
-  double interiorBand = 0.0;
-};
-
-/// Signed distance to a closed mesh as a field, positive inside, world units.
-///
-/// Fine bricks near the surface and coarser levels behind them, each twice the voxel size of the one before,
-/// within 0.05 fine voxels of the exact distance away from the medial axis. Beyond the bands: the constant at
-/// its edge. Memory follows the surface, not the width of the band.
-ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options,
-                         const Progress& progress = silent());
-
 /// Volume enclosed by the zero surface of a level set, world units cubed.
 double enclosedVolume(const VdbGrid& levelSet);
 

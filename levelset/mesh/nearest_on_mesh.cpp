@@ -3,6 +3,8 @@
 // Embree keeps the triangles relative to the centre of their box, so that floats resolve the mesh and not its
 // place in the world. Within a block of points each query starts from the distance to the last answer, which
 // is a bound.
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
+
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
@@ -11,7 +13,6 @@
 #include <limits>
 #include <vector>
 
-#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/field_node.h"
 

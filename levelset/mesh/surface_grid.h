@@ -3,7 +3,7 @@
 #include <functional>
 #include <span>
 
-#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/field/field.h"
 

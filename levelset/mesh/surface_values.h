@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/levelset/mesh/range_tree.h"
 
 /// What the fields of attributes are made of. Not for other folders.

@@ -26,8 +26,8 @@
 #include <optional>
 #include <tuple>
 
+#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/levelset/warp/surface_relaxation.h"
 #include "nephele/levelset/warp/transfer_quality.h"
 #include "nephele/modeling/base/error.h"

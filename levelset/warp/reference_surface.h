@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 
 /// What attributes are carried from. Not part of the interface.
 namespace nephele::detail {

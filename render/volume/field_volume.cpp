@@ -16,7 +16,7 @@
 #include <limits>
 #include <vector>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "nephele/levelset/flow/advection_files.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"

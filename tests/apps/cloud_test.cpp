@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"

@@ -7,11 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
-#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/render/image/exr_io.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/run_program.h"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "nephele/levelset/flow/advection.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/operations.h"

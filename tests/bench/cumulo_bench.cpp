@@ -5,6 +5,7 @@
 
 #include "nephele/levelset/cloud/cloud_density.h"
 #include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"

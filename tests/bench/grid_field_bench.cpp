@@ -10,7 +10,7 @@
 #include <random>
 
 #include "nephele/levelset/cloud/attribute_field.h"
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_kernels.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"

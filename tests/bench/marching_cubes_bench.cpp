@@ -5,7 +5,8 @@
 #include <map>
 #include <memory>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
+#include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"

@@ -2,7 +2,7 @@
 // points, alignment, relaxation, and the warp field on a grid.
 #include <benchmark/benchmark.h>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/mesh/exact_distance.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/warp/alignment.h"

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "nephele/levelset/io/mesh_io.h"
-#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/check_field.h"
 #include "tests/support/test_data.h"

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "nephele/levelset/cloud/cloud.h"
-#include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/shape/shapes.h"

@@ -11,7 +11,6 @@
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/cloud/cloud_density.h"
 #include "nephele/levelset/cloud/cumulo_grids.h"
-#include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"

@@ -8,6 +8,7 @@
 #include "nephele/levelset/cloud/cloud_density.h"
 #include "nephele/levelset/cloud/cumulo_grids.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/surface_point.h"

@@ -8,8 +8,6 @@
 #include <limits>
 #include <random>
 
-#include "nephele/levelset/grid/grid_field.h"
-
 namespace nephele::test {
 namespace {
 

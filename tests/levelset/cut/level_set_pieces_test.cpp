@@ -8,10 +8,10 @@
 #include <limits>
 #include <random>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
-#include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/shape/shapes.h"

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_topology.h"

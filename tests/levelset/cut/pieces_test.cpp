@@ -9,12 +9,13 @@
 #include <limits>
 #include <numeric>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/shape/combinations.h"
 #include "nephele/modeling/shape/shapes.h"

@@ -1,3 +1,5 @@
+#include "nephele/levelset/grid/bake.h"
+
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

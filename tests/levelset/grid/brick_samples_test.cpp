@@ -5,6 +5,7 @@
 #include <atomic>
 #include <limits>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_memo.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/base/error.h"

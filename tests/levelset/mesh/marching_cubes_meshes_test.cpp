@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"

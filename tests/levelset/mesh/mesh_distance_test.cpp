@@ -7,7 +7,7 @@
 #include <random>
 
 #include "nephele/levelset/io/mesh_io.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/warp/surface_relaxation.h"

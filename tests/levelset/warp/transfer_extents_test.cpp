@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/warp/mesh_warp.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/shape/shapes.h"
