@@ -5,7 +5,7 @@
 
 #include "apps/options/cut_options.h"
 #include "nephele/levelset/cut/cut_input.h"
-#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/cut/cut_level_set.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"

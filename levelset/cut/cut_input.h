@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/cut/piece_set.h"
+#include "nephele/levelset/cut/cut_parts.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 
 /// What a cut works with, from files.

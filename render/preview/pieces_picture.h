@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "nephele/levelset/cut/piece_set.h"
+#include "nephele/levelset/cut/cut_parts.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
 

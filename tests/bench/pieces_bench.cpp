@@ -11,9 +11,9 @@
 #include <ctime>
 #include <filesystem>
 
-#include "nephele/levelset/cut/level_set_pieces.h"
-#include "nephele/levelset/cut/mesh_pieces.h"
-#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/cut/cut.h"
+#include "nephele/levelset/cut/cut_into_level_sets.h"
+#include "nephele/levelset/cut/cut_level_set.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"

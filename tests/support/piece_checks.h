@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_topology.h"
 

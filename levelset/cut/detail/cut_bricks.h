@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/cut/cut_into_level_sets.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/memory_chunks.h"
 

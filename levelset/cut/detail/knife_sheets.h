@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/mesh/triangle_tree.h"
 
 namespace nephele::detail {

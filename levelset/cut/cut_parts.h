@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
-#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/cut/cut.h"
+#include "nephele/levelset/cut/cut_into_level_sets.h"
 #include "nephele/levelset/mesh/mass_properties.h"
 
 /// Pieces with names, and pieces that are cut again.

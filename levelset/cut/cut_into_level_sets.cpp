@@ -11,7 +11,7 @@
 // The minimum, not the product of the notes, which bends the outer surface. Everything is ordered by place,
 // never by knife or thread. Limits: rims are bevelled by the grid; a neck that is thinner than a voxel and
 // bent is not found.
-#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/cut/cut_into_level_sets.h"
 
 #include <fmt/format.h>
 
@@ -328,7 +328,7 @@ class Cutter {
     }
     giveTo(pieceOf);
     codeOfOwner_ = std::move(codes);
-    std::vector<PieceLevel> levels = writeLevels(groups.size());
+    std::vector<PieceLevelSet> levels = writeLevels(groups.size());
     for (std::uint32_t g = 0; g < groups.size(); ++g) {
       Piece& piece = result.pieces.emplace_back();
       const CutCode& code = cut_.codes[codeOfOwner_[g]];
@@ -588,13 +588,13 @@ class Cutter {
   }
 
   /// The level sets of the first owners.
-  std::vector<PieceLevel> writeLevels(std::size_t count) const {
+  std::vector<PieceLevelSet> writeLevels(std::size_t count) const {
     // Boxes first, then places for samples, as they are needed.
-    std::vector<PieceLevel::Table> tables(count);
+    std::vector<PieceLevelSet::Table> tables(count);
     std::vector<Vec3i> last(count);
     for (std::size_t i = 0; i < cut_.count(); ++i)
       for (const Near& near : near_.of(i)) {
-        PieceLevel::Table& table = tables[near.owner];
+        PieceLevelSet::Table& table = tables[near.owner];
         const Vec3i& at = brick(i).brick;
         const bool isFirst = table.bricks.count.x == 0;
         table.bricks.first = isFirst ? at : min(table.bricks.first, at);
@@ -602,9 +602,9 @@ class Cutter {
         table.bricks.count.x = 1;
       }
     for (std::size_t p = 0; p < count; ++p) {
-      PieceLevel::Table& table = tables[p];
+      PieceLevelSet::Table& table = tables[p];
       table.bricks.count = last[p] - table.bricks.first + Vec3i{1, 1, 1};
-      table.entries.assign(table.bricks.size(), PieceLevel::kOutside);
+      table.entries.assign(table.bricks.size(), PieceLevelSet::kOutside);
     }
     const auto samples = std::make_shared<detail::LargeArray>(near_.items.size() * kSamples);
     std::atomic<std::int32_t> used{0};
@@ -620,20 +620,21 @@ class Cutter {
               std::int32_t& entry =
                   tables[near.owner].entries[tables[near.owner].bricks.numberOf(brick(i).brick)];
               if (view.kind != BrickView::Kind::mixed) {
-                entry = view.kind == BrickView::Kind::inside ? PieceLevel::kInside : PieceLevel::kOutside;
+                entry =
+                    view.kind == BrickView::Kind::inside ? PieceLevelSet::kInside : PieceLevelSet::kOutside;
                 continue;
               }
               if (place < 0) place = used.fetch_add(1);
               const Interval range = evaluate(view, planes, samples->data() + std::size_t(place) * kSamples);
-              entry = range.max == -band_  ? PieceLevel::kOutside
-                      : range.min == band_ ? PieceLevel::kInside
+              entry = range.max == -band_  ? PieceLevelSet::kOutside
+                      : range.min == band_ ? PieceLevelSet::kInside
                                            : place + 2;
               if (entry == place + 2) place = -1;
             }
         },
         progress_);
-    std::vector<PieceLevel> levels;
-    for (PieceLevel::Table& table : tables) levels.emplace_back(h_, band_, std::move(table), samples);
+    std::vector<PieceLevelSet> levels;
+    for (PieceLevelSet::Table& table : tables) levels.emplace_back(h_, band_, std::move(table), samples);
     return levels;
   }
 

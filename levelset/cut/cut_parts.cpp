@@ -4,7 +4,7 @@
 // by an earlier cut and may have been cut again from either side, are found by triangles of the same place:
 // both sides were cut by the same knives, so that they are the same triangles up to rounding. Level sets have
 // no such faces; there the other side is looked for a little in front of each inner triangle.
-#include "nephele/levelset/cut/piece_set.h"
+#include "nephele/levelset/cut/cut_parts.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include <numeric>
 #include <set>
 
-#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/cut/cut_level_set.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_distance.h"

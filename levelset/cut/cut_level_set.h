@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/grid/brick_grid.h"
 
 namespace nephele {

@@ -2,9 +2,9 @@
 
 #include <span>
 
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/cut/detail/carve.h"
 #include "nephele/levelset/cut/detail/cut_source.h"
-#include "nephele/levelset/cut/mesh_pieces.h"
 
 namespace nephele::detail {
 

@@ -1,6 +1,6 @@
 // Samples of pieces without borders: what a cut writes, as fast as memory allows. Values between samples are
 // those of the plain loop of grid_kernels.h, read across bricks.
-#include "nephele/levelset/cut/piece_level.h"
+#include "nephele/levelset/cut/piece_level_set.h"
 
 #include <algorithm>
 #include <array>
@@ -29,9 +29,10 @@ constexpr std::size_t offsetIn(const Vec3i& inside) {
 
 namespace detail {
 
-class PieceLevelNode final : public FieldNode<float> {
+class PieceLevelSetNode final : public FieldNode<float> {
  public:
-  explicit PieceLevelNode(PieceLevel level) : level_(std::move(level)), toIndex_(1 / level_.voxelSize()) {}
+  explicit PieceLevelSetNode(PieceLevelSet level)
+      : level_(std::move(level)), toIndex_(1 / level_.voxelSize()) {}
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch&) const override {
     for (int i = 0; i < points.count; ++i) values[0][i] = valueAt({points.x[i], points.y[i], points.z[i]});
@@ -51,8 +52,8 @@ class PieceLevelNode final : public FieldNode<float> {
     std::array<float, 8> corners;
     const Vec3i inside{insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)};
     const std::int32_t entry = level_.table_->entryAt(brickOf(voxel));
-    if (entry == PieceLevel::kOutside) return -level_.band();
-    if (entry == PieceLevel::kInside) return level_.band();
+    if (entry == PieceLevelSet::kOutside) return -level_.band();
+    if (entry == PieceLevelSet::kInside) return level_.band();
     if (std::max({inside.x, inside.y, inside.z}) < kBrick - 1) {
       const float* samples = level_.samplesOf(entry);
       for (int c = 0; c < 8; ++c)
@@ -67,47 +68,47 @@ class PieceLevelNode final : public FieldNode<float> {
     return blend(blend(along[0], along[1], t.y), blend(along[2], along[3], t.y), t.z);
   }
 
-  PieceLevel level_;
+  PieceLevelSet level_;
   float toIndex_;
 };
 
 }  // namespace detail
 
-PieceLevel::PieceLevel(float voxelSize, float band, Table table,
-                       std::shared_ptr<const detail::LargeArray> bricks)
+PieceLevelSet::PieceLevelSet(float voxelSize, float band, Table table,
+                             std::shared_ptr<const detail::LargeArray> bricks)
     : voxelSize_(voxelSize),
       band_(band),
       table_(std::make_shared<const Table>(std::move(table))),
       bricks_(std::move(bricks)) {}
 
-std::size_t PieceLevel::storedBricks() const {
+std::size_t PieceLevelSet::storedBricks() const {
   return std::size_t(std::count_if(table_->entries.begin(), table_->entries.end(),
                                    [](std::int32_t entry) { return entry > kInside; }));
 }
 
-std::size_t PieceLevel::memoryBytes() const {
+std::size_t PieceLevelSet::memoryBytes() const {
   return sizeof(Table) + table_->entries.size() * sizeof(std::int32_t) +
          storedBricks() * kSamples * sizeof(float);
 }
 
-const float* PieceLevel::samplesOf(std::int32_t entry) const {
+const float* PieceLevelSet::samplesOf(std::int32_t entry) const {
   return bricks_->data() + std::size_t(entry - 2) * kSamples;
 }
 
-float PieceLevel::at(const Vec3i& voxel) const {
+float PieceLevelSet::at(const Vec3i& voxel) const {
   const std::int32_t entry = table_->entryAt(brickOf(voxel));
   if (entry == kOutside) return -band_;
   if (entry == kInside) return band_;
   return samplesOf(entry)[offsetIn({insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)})];
 }
 
-ScalarField PieceLevel::field() const {
-  require(table_ != nullptr, "PieceLevel: holds nothing");
-  return ScalarField(std::make_shared<detail::PieceLevelNode>(*this));
+ScalarField PieceLevelSet::field() const {
+  require(table_ != nullptr, "PieceLevelSet: holds nothing");
+  return ScalarField(std::make_shared<detail::PieceLevelSetNode>(*this));
 }
 
-double PieceLevel::volume() const {
-  require(table_ != nullptr, "PieceLevel: holds nothing");
+double PieceLevelSet::volume() const {
+  require(table_ != nullptr, "PieceLevelSet: holds nothing");
   // By table entry and by place among the bricks that hold samples, which come after the two ends.
   std::vector<const float*> samples(2);
   std::vector<detail::BrickMask> inside{{}, detail::BrickMask::all()};
@@ -154,8 +155,8 @@ double PieceLevel::volume() const {
   return std::accumulate(sums.begin(), sums.end(), 0.0) * voxel * voxel * voxel;
 }
 
-std::shared_ptr<BrickGrid> PieceLevel::toBricks() const {
-  require(table_ != nullptr, "PieceLevel: holds nothing");
+std::shared_ptr<BrickGrid> PieceLevelSet::toBricks() const {
+  require(table_ != nullptr, "PieceLevelSet: holds nothing");
   auto grid = std::make_shared<BrickGrid>();
   grid->indexToWorld.linear = Mat3f::scaling(voxelSize_);
   grid->worldToIndex.linear = Mat3f::scaling(1 / voxelSize_);

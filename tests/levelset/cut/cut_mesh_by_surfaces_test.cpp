@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/error.h"

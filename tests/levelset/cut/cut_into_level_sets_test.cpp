@@ -1,4 +1,4 @@
-#include "nephele/levelset/cut/pieces.h"
+#include "nephele/levelset/cut/cut_into_level_sets.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -152,7 +152,7 @@ TEST(Pieces, OfOnePlaneAreTheCapsOfTheBall) {
 }
 
 /// Whether a sample within `reach` steps is inside.
-bool isNearInside(const PieceLevel& grid, const Vec3i& voxel, int reach) {
+bool isNearInside(const PieceLevelSet& grid, const Vec3i& voxel, int reach) {
   for (int z = -reach; z <= reach; ++z)
     for (int y = -reach; y <= reach; ++y)
       for (int x = -reach; x <= reach; ++x)
@@ -171,7 +171,7 @@ TEST(Pieces, EqualTheirField) {
     EXPECT_EQ(cut.pieces.size(), 8u);
     for (const Piece& piece : cut.pieces) {
       const ScalarField field = pieceField(ball(), knives, piece.code, kerf);
-      const PieceLevel& grid = piece.level;
+      const PieceLevelSet& grid = piece.level;
       for (int k = -24; k <= 24; k += 3)
         for (int j = -24; j <= 24; j += 2)
           for (int i = -24; i <= 24; ++i) {

@@ -12,7 +12,7 @@ namespace nephele {
 
 namespace detail {
 class LargeArray;
-class PieceLevelNode;
+class PieceLevelSetNode;
 }  // namespace detail
 
 /// The level set of a piece: distances in bricks of 8^3 samples about its surface, one of the two ends of the
@@ -20,7 +20,7 @@ class PieceLevelNode;
 ///
 /// A handle, cheap to copy, never changed once made. All pieces of one cut keep their bricks in one array,
 /// which lives as long as any of them: 2 kB for each brick, and 4 bytes for each place of the table.
-class PieceLevel {
+class PieceLevelSet {
  public:
   /// Table entries for bricks without samples.
   static constexpr std::int32_t kOutside = 0, kInside = 1;
@@ -37,8 +37,8 @@ class PieceLevel {
     }
   };
 
-  PieceLevel() = default;
-  PieceLevel(float voxelSize, float band, Table table, std::shared_ptr<const detail::LargeArray> bricks);
+  PieceLevelSet() = default;
+  PieceLevelSet(float voxelSize, float band, Table table, std::shared_ptr<const detail::LargeArray> bricks);
 
   float voxelSize() const { return voxelSize_; }
   /// How far from the surface values go, world units.
@@ -66,7 +66,7 @@ class PieceLevel {
   std::shared_ptr<BrickGrid> toBricks() const;
 
  private:
-  friend class detail::PieceLevelNode;
+  friend class detail::PieceLevelSetNode;
 
   const float* samplesOf(std::int32_t entry) const;
 

@@ -1,4 +1,4 @@
-#include "nephele/levelset/cut/piece_level.h"
+#include "nephele/levelset/cut/piece_level_set.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "nephele/levelset/cut/cut_into_level_sets.h"
 #include "nephele/levelset/cut/detail/cut_kernels.h"
-#include "nephele/levelset/cut/pieces.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
@@ -35,7 +35,7 @@ bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-TEST(PieceLevel, HasTheSamplesOfItsCopy) {
+TEST(PieceLevelSet, HasTheSamplesOfItsCopy) {
   const Pieces cut = ballInPieces(3, 0.05f);
   ASSERT_GT(cut.pieces.size(), 3u);
   for (const Piece& piece : cut.pieces) {
@@ -47,7 +47,7 @@ TEST(PieceLevel, HasTheSamplesOfItsCopy) {
   }
 }
 
-TEST(PieceLevel, IsAsAFieldWhatItsCopyIs) {
+TEST(PieceLevelSet, IsAsAFieldWhatItsCopyIs) {
   // The copy's kernels are tested by themselves; both interpolate with the same operations.
   const Pieces cut = ballInPieces(4, 0.05f);
   std::mt19937 random(3);
@@ -64,9 +64,9 @@ TEST(PieceLevel, IsAsAFieldWhatItsCopyIs) {
   }
 }
 
-TEST(PieceLevel, OutlivesItsCut) {
+TEST(PieceLevelSet, OutlivesItsCut) {
   Pieces cut = ballInPieces(2, 0.05f);
-  const PieceLevel kept = cut.pieces[0].level;
+  const PieceLevelSet kept = cut.pieces[0].level;
   const auto before = kept.toBricks();
   cut = {};
   const auto after = kept.toBricks();
@@ -74,14 +74,14 @@ TEST(PieceLevel, OutlivesItsCut) {
             0);
 }
 
-TEST(PieceLevel, TakesLessThanHalfOfACopyWithBorders) {
+TEST(PieceLevelSet, TakesLessThanHalfOfACopyWithBorders) {
   for (const Piece& piece : ballInPieces(5, 0.03f).pieces)
     EXPECT_LT(2 * piece.level.memoryBytes(), piece.level.toBricks()->memoryBytes());
 }
 
-TEST(PieceLevel, RefusesToBeAFieldOfNothing) {
-  EXPECT_THROW(PieceLevel().field(), Error);
-  EXPECT_THROW(PieceLevel().toBricks(), Error);
+TEST(PieceLevelSet, RefusesToBeAFieldOfNothing) {
+  EXPECT_THROW(PieceLevelSet().field(), Error);
+  EXPECT_THROW(PieceLevelSet().toBricks(), Error);
 }
 
 TEST(PieceVolumes, AreThoseOfTheMarchingCubesMeshes) {

@@ -6,8 +6,6 @@
 // no other can reach the cell (radius of security: Levy and Bonneel, "Variational Anisotropic Surface Meshing
 // with Voronoi Parallel Linear Enumeration", 2012). Contacts are found by their triangles, which are the same
 // on both sides. Everything is ordered by cell, code and place in the source, never by thread.
-#include "nephele/levelset/cut/mesh_pieces.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +15,8 @@
 #include <memory>
 #include <numeric>
 
-#include "nephele/levelset/cut/detail/carved_pieces.h"
+#include "nephele/levelset/cut/cut.h"
+#include "nephele/levelset/cut/detail/flat_cut.h"
 #include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"

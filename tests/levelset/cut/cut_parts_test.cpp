@@ -1,4 +1,4 @@
-#include "nephele/levelset/cut/piece_set.h"
+#include "nephele/levelset/cut/cut_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // Cutting level sets by linear cells.
 //
 // Curved knives are brought to the level set's own lattice (lattice_carve.cpp). Planes and bisectors of cells
-// are linear everywhere, so that splitting the closed parts that are left by them (mesh_pieces.cpp) is the
+// are linear everywhere, so that splitting the closed parts that are left by them (cut_mesh.cpp) is the
 // same as splitting all tetrahedra, without the pieces of faces that lie in one plane.
 //
 // Rounding, and ties, depend on the order in which knives are taken. They are taken in an order of their own:
 // planes, rough blades and points by their numbers, fields by their values at some points; codes and cells
 // are then put into the order of the caller.
-#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/cut/cut_level_set.h"
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "nephele/levelset/cut/detail/carved_pieces.h"
+#include "nephele/levelset/cut/detail/flat_cut.h"
 #include "nephele/levelset/cut/detail/lattice_carve.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/noise/noise_draw.h"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "nephele/levelset/cut/piece_level.h"
+#include "nephele/levelset/cut/piece_level_set.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/shape/knives.h"
 
@@ -34,7 +34,7 @@ struct Piece {
   std::optional<std::uint32_t> cell;
   /// min(shape, +-knives - kerf / 2, distance to the cell's sides) within the band of its surface, the band's
   /// ends beyond; positive inside. Other pieces of the same code are outside of it.
-  PieceLevel level;
+  PieceLevelSet level;
 };
 
 struct Pieces {

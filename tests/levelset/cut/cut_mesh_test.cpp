@@ -1,5 +1,3 @@
-#include "nephele/levelset/cut/mesh_pieces.h"
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -7,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/levelset/mesh/mesh_repair.h"

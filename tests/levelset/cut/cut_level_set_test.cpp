@@ -1,4 +1,4 @@
-#include "nephele/levelset/cut/level_set_pieces.h"
+#include "nephele/levelset/cut/cut_level_set.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
