@@ -4,7 +4,7 @@
 #include <string>
 
 #include "apps/options/options.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 
 namespace nephele::apps {
 

@@ -59,6 +59,11 @@ ScalarField pow(const ScalarField& base, const ScalarField& exponent);
 ScalarField min(const ScalarField& a, const ScalarField& b);
 /// The larger value. Where one of the two is NaN, the other.
 ScalarField max(const ScalarField& a, const ScalarField& b);
+/// The larger value with a fillet, which joins shapes smoothly: max(a, b) + (radius - |a - b|)^2 / (4 radius)
+/// where |a - b| < radius, else max(a, b). Adds at most radius / 4 (world units, where a and b are
+/// distances).
+/// @throws Error unless radius > 0 and finite.
+ScalarField blend(const ScalarField& a, const ScalarField& b, float radius);
 /// f kept inside [low, high]; NaN becomes `low`. @throws Error if low > high or one is NaN.
 ScalarField clamp(const ScalarField& f, float low, float high);
 /// The same with limits that vary. Where low > high: `high`.

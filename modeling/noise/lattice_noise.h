@@ -4,7 +4,7 @@
 
 #include "nephele/modeling/noise/detail/noise_kernels.h"
 
-/// Noises of a lattice on lanes of points. See noises.h for what they compute.
+/// Noises of a lattice on lanes of points. See noise.h for what they compute.
 namespace nephele::detail {
 
 enum class LatticeKind { perlin, simplex, value, worley, worleyDifference, gabor };

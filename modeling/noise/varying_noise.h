@@ -1,6 +1,6 @@
 #pragma once
 
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 
 namespace nephele {
 

@@ -1,4 +1,4 @@
-// Combinations of shapes that other operations express; `blend` is an operation of its own, in field/operations.cpp.
+// Combinations of shapes, as other operations express them.
 //
 // A union or intersection of many parts is built as a balanced tree, so that restriction to a box looks at
 // each part a few times only and depth stays small.

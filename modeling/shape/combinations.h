@@ -18,10 +18,6 @@ ScalarField intersection(const ScalarField& a, const ScalarField& b);
 ScalarField intersection(std::span<const ScalarField> parts);
 /// Inside `a` but not inside `b`: min(a, -b).
 ScalarField cutout(const ScalarField& a, const ScalarField& b);
-/// Union with a fillet: max(a, b) + (radius - |a - b|)^2 / (4 radius) where |a - b| < radius, else max(a, b).
-/// Adds at most radius / 4 (world units, where a and b are distances). @throws Error unless radius > 0 and
-/// finite.
-ScalarField blend(const ScalarField& a, const ScalarField& b, float radius);
 /// The skin of a shape, `thickness` world units thick, half of it to each side of the surface: thickness / 2
 /// - |l|.
 /// @throws Error unless thickness > 0 and finite.

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "nephele/modeling/field/field.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 
 /// What cuts a shape: scalar fields whose zero surface is the blade, and cells around points. Any shape is a
 /// knife, too: a sphere cuts out a ball, a mesh's distance its solid.

@@ -13,7 +13,7 @@
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
 
 namespace nephele {

@@ -13,7 +13,6 @@
 #include "nephele/modeling/noise/detail/spectral_noise.h"
 #include "nephele/modeling/noise/lattice_noise.h"
 #include "nephele/modeling/noise/noise.h"
-#include "nephele/modeling/noise/noises.h"
 
 namespace nephele {
 namespace {

@@ -299,45 +299,6 @@ void binaryGradLanes(Binary op, Parameters p, const float* a, const float* b, fl
   withBinary(op, p, [=](const auto& o) HWY_ATTR { binaryGradLoop(o, a, b, out, ga, gb, count); });
 }
 
-void productLanes(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
-  const D d;
-  const V s = constant(sign);
-  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V p = hn::Mul(hn::Mul(hn::Load(d, a + i), s), hn::Load(d, b + i));
-    hn::Store(accumulate ? hn::Add(hn::Load(d, out + i), p) : p, d, out + i);
-  }
-}
-
-void length3Lanes(const float* const v[3], float* out, int count) {
-  const D d;
-  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V x = hn::Load(d, v[0] + i), y = hn::Load(d, v[1] + i), z = hn::Load(d, v[2] + i);
-    hn::Store(hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), d, out + i);
-  }
-}
-
-void normalize3Lanes(const float* const v[3], const float* length, float* const out[3], int count) {
-  const D d;
-  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V l = hn::Load(d, length + i);
-    const auto zero = hn::Eq(l, hn::Zero(d));
-    for (int k = 0; k < 3; ++k)
-      hn::Store(hn::IfThenZeroElse(zero, hn::Div(hn::Load(d, v[k] + i), l)), d, out[k] + i);
-  }
-}
-
-void affine3Lanes(const float m[9], const float t[3], const float* const v[3], float* const out[3],
-                  int count) {
-  const D d;
-  for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V x = hn::Load(d, v[0] + i), y = hn::Load(d, v[1] + i), z = hn::Load(d, v[2] + i);
-    for (int r = 0; r < 3; ++r) {
-      const V xy = hn::Add(hn::Mul(constant(m[3 * r]), x), hn::Mul(constant(m[3 * r + 1]), y));
-      hn::Store(hn::Add(hn::Add(xy, hn::Mul(constant(m[3 * r + 2]), z)), constant(t[r])), d, out[r] + i);
-    }
-  }
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace nephele::detail
 HWY_AFTER_NAMESPACE();
@@ -350,10 +311,6 @@ HWY_EXPORT(unaryLanes);
 HWY_EXPORT(unaryGradLanes);
 HWY_EXPORT(binaryLanes);
 HWY_EXPORT(binaryGradLanes);
-HWY_EXPORT(productLanes);
-HWY_EXPORT(length3Lanes);
-HWY_EXPORT(normalize3Lanes);
-HWY_EXPORT(affine3Lanes);
 
 bool isPlainLoop(Unary op) {
   return op >= Unary::tangent && op <= Unary::arcTangent;
@@ -377,78 +334,6 @@ float derivative(Unary op, float a, float v) {
 }
 
 }  // namespace
-
-float scalarValue(Unary op, Parameters parameters, float a) {
-  const auto [p, q] = parameters;
-  switch (op) {
-    case Unary::negate:
-      return -a;
-    case Unary::absolute:
-      return std::fabs(a);
-    case Unary::square:
-      return a * a;
-    case Unary::squareRoot:
-      return std::sqrt(a);
-    case Unary::exponential:
-      return std::exp(a);
-    case Unary::logarithm:
-      return std::log(a);
-    case Unary::sine:
-      return std::sin(a);
-    case Unary::cosine:
-      return std::cos(a);
-    case Unary::tangent:
-      return std::tan(a);
-    case Unary::arcSine:
-      return std::asin(a);
-    case Unary::arcCosine:
-      return std::acos(a);
-    case Unary::arcTangent:
-      return std::atan(a);
-    case Unary::floor:
-      return std::floor(a);
-    case Unary::mask:
-      return a > 0 ? 1.0f : 0.0f;
-    case Unary::clamp: {
-      const float m = a > p ? a : p;
-      return m < q ? m : q;
-    }
-    case Unary::smoothstep: {
-      float t = (a - p) * (1 / (q - p));
-      t = t > 0 ? t : 0;
-      t = t < 1 ? t : 1;
-      return t * t * (3 - (t + t));
-    }
-  }
-  return std::nanf("");
-}
-
-float scalarValue(Binary op, Parameters parameters, float a, float b) {
-  switch (op) {
-    case Binary::add:
-      return a + b;
-    case Binary::subtract:
-      return a - b;
-    case Binary::multiply:
-      return a * b;
-    case Binary::divide:
-      return a / b;
-    case Binary::minimum:
-      return a < b || b != b ? a : b;
-    case Binary::maximum:
-      return a > b || b != b ? a : b;
-    case Binary::power:
-      return std::pow(a, b);
-    case Binary::arcTangent2:
-      return std::atan2(a, b);
-    case Binary::blend: {
-      const float overlap = parameters.p - std::fabs(a - b);
-      const float inside = overlap > 0 ? overlap : 0;
-      return scalarValue(Binary::maximum, {}, a, b) + inside * inside * (0.25f / parameters.p);
-    }
-  }
-  return std::nanf("");
-}
 
 void apply(Unary op, Parameters parameters, const float* a, float* out, int count) {
   if (!isPlainLoop(op)) {
@@ -500,19 +385,6 @@ void applyGrad(Binary op, Parameters parameters, const float* a, const float* b,
     for (int k = 0; k < 3; ++k) ga[k][i] = da * ga[k][i] + db * gb[k][i];
     out[i] = scalarValue(op, parameters, x, y);
   }
-}
-
-void product(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
-  HWY_DYNAMIC_DISPATCH(productLanes)(a, b, sign, accumulate, out, count);
-}
-void length3(const float* const v[3], float* out, int count) {
-  HWY_DYNAMIC_DISPATCH(length3Lanes)(v, out, count);
-}
-void normalize3(const float* const v[3], const float* length, float* const out[3], int count) {
-  HWY_DYNAMIC_DISPATCH(normalize3Lanes)(v, length, out, count);
-}
-void affine3(const float m[9], const float t[3], const float* const v[3], float* const out[3], int count) {
-  HWY_DYNAMIC_DISPATCH(affine3Lanes)(m, t, v, out, count);
 }
 
 }  // namespace nephele::detail

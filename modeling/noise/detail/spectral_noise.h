@@ -4,7 +4,7 @@
 
 #include "nephele/modeling/noise/detail/noise_kernels.h"
 
-/// Gaussian random fields with a given spectrum, synthesised on a periodic grid. See noises.h.
+/// Gaussian random fields with a given spectrum, synthesised on a periodic grid. See noise.h.
 namespace nephele::detail {
 
 struct Spectrum {

@@ -16,7 +16,7 @@
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::test {

@@ -11,7 +11,7 @@
 #include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 #include "tests/support/density.h"
 
 namespace nephele::test {

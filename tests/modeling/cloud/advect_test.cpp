@@ -9,7 +9,7 @@
 #include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
-#include "nephele/modeling/noise/noises.h"
+#include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
 #include "tests/support/check_field.h"
 
