@@ -24,14 +24,14 @@
 
 namespace nephele {
 
-void writeDeepExr(const std::string& path, const DeepImage& image, const Camera& camera,
+void writeDeepExr(const std::string& path, const DeepImage& image, const ImageCamera& camera,
                   const std::map<std::string, std::string>& metadata) {
   OutputFile output(path);
   writeDeepExr(output, image, camera, metadata);
   output.commit();
 }
 
-void writeDeepExr(const OutputFile& output, const DeepImage& image, const Camera& camera,
+void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageCamera& camera,
                   const std::map<std::string, std::string>& metadata) {
   require(image.width > 0 && image.height > 0, "deep exr: the image is empty");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
@@ -91,7 +91,7 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const Camera
   }
 }
 
-void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const Camera& camera,
+void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const ImageCamera& camera,
                   const std::map<std::string, std::string>& metadata) {
   OutputFile flatFile(paths.flat), deepFile(paths.deep);
   writeDeepExr(deepFile, deep, camera, metadata);

@@ -110,26 +110,26 @@ Imath::Box2i detail::dataWindow(int width, int height, const std::optional<Image
 }
 
 Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::Display>& display,
-                              const Camera& camera, const std::map<std::string, std::string>& metadata) {
+                              const ImageCamera& camera, const std::map<std::string, std::string>& metadata) {
   const Image::Display d = display.value_or(Image::Display{0, 0, width, height});
   Imf::Header header(Imath::Box2i({0, 0}, {d.width - 1, d.height - 1}), dataWindow(width, height, display));
   header.compression() = Imf::ZIP_COMPRESSION;
-  header.screenWindowWidth() = float(camera.screenWidth());
+  header.screenWindowWidth() = camera.screenWidth;
   Imf::addChromaticities(header, Imf::Chromaticities());
-  Imf::addWorldToCamera(header, matrix(camera.worldToCamera()));
-  Imf::addWorldToNDC(header, matrix(camera.worldToNdc()));
+  Imf::addWorldToCamera(header, matrix(camera.worldToCamera));
+  Imf::addWorldToNDC(header, matrix(camera.worldToNdc));
   for (const auto& [name, value] : metadata) header.insert(name, Imf::StringAttribute(value));
   return header;
 }
 
-void writeExr(const std::string& path, const Image& image, const Camera& camera,
+void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
   OutputFile output(path);
   writeExr(output, image, camera, metadata);
   output.commit();
 }
 
-void writeExr(const OutputFile& output, const Image& image, const Camera& camera,
+void writeExr(const OutputFile& output, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
   require(image.width > 0 && image.height > 0 && !image.channels.empty(), "exr: the image is empty");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);

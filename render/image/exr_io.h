@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "nephele/render/image/image.h"
-#include "nephele/render/scene/camera.h"
+#include "nephele/render/image/image_camera.h"
 
 namespace nephele {
 
@@ -13,16 +13,16 @@ class OutputFile;
 
 /// Writes an OpenEXR file, ZIP compressed: channels as 16 or 32 bit floats as they say, linear Rec. 709.
 ///
-/// Carries `chromaticities`, the camera's `worldToCamera` and `worldToNDC` (see Camera; for row vectors) and
-/// `metadata` as text attributes, the screen window for the picture's width at distance 1. The data window is
-/// the image's, in a display window of the whole picture's size (Image::display). 16 bit values beyond 65504
-/// are clamped to it. Written beside `path` and renamed.
+/// Carries `chromaticities`, `worldToCamera` and `worldToNDC` of the camera (a Camera will do; for row
+/// vectors) and `metadata` as text attributes, the screen window for the picture's width at distance 1. The
+/// data window is the image's, in a display window of the whole picture's size (Image::display). 16 bit
+/// values beyond 65504 are clamped to it. Written beside `path` and renamed.
 /// @throws Error naming the path; no partial file stays.
-void writeExr(const std::string& path, const Image& image, const Camera& camera,
+void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata = {});
 
 /// Likewise into `output`, which the caller commits.
-void writeExr(const OutputFile& output, const Image& image, const Camera& camera,
+void writeExr(const OutputFile& output, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata = {});
 
 /// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1. The pixels

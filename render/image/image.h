@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/math.h"
-#include "nephele/render/scene/camera.h"
+#include "nephele/render/image/pixel_box.h"
 
 namespace nephele {
 

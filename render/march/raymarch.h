@@ -18,6 +18,13 @@
 
 namespace nephele {
 
+/// How close the opacity and colour of deep samples follow the march at every depth.
+struct DeepOptions {
+  /// Largest error of the opacity in front of any depth, and of the colour as a share of the pixel's.
+  /// Samples become as long as it allows. What all samples together give is exact whatever it is.
+  float tolerance = 0.004f;
+};
+
 /// How finely rays look at a density that is a field and not a grid, see gridlessVolume.
 struct Refinement {
   /// A step is halved where that changes the opacity that is seen of it, behind all that is in front, by more

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "nephele/modeling/base/math.h"
+#include "nephele/render/image/image_camera.h"
+#include "nephele/render/image/pixel_box.h"
 
 namespace nephele {
 
@@ -13,18 +14,6 @@ namespace nephele {
 struct Ray {
   Vec3d origin;
   Vec3d direction;
-};
-
-/// Row-major 4x4 matrix for row vectors, p' = p M, as images store it.
-using Mat44 = std::array<float, 16>;
-
-/// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; (0, 0) is the upper left one.
-struct PixelBox {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-
-  int width() const { return x1 - x0; }
-  int height() const { return y1 - y0; }
-  bool operator==(const PixelBox&) const = default;
 };
 
 /// Horizontal angle of view in degrees of a lens of `focalLength` in front of a film `filmWidth` wide (the
@@ -129,6 +118,8 @@ class Camera {
   /// and (1, 1) the lower right one of the whole picture, whatever the crop; z is 1 / depth, or -depth for an
   /// orthographic camera.
   Mat44 worldToNdc() const;
+  /// What images store of it.
+  operator ImageCamera() const { return {worldToCamera(), worldToNdc(), float(screenWidth())}; }
 
  private:
   struct Pose {

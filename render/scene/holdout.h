@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "nephele/render/image/deep_image.h"
-#include "nephele/render/march/march_kernels.h"
 #include "nephele/render/scene/camera.h"
+#include "nephele/render/scene/holdout_curve.h"
 
 namespace nephele {
 

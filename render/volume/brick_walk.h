@@ -4,7 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "nephele/render/march/march_kernels.h"
+#include "nephele/render/volume/lattice_ray.h"
+#include "nephele/render/volume/march_scene.h"
 
 namespace nephele::detail {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "nephele/modeling/base/math.h"
-#include "nephele/render/march/march_kernels.h"
+#include "nephele/render/volume/lattice_ray.h"
 
 namespace nephele {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "nephele/render/image/image.h"
-#include "nephele/render/scene/camera.h"
+#include "nephele/render/image/image_camera.h"
 
 namespace nephele::detail {
 
@@ -17,6 +17,6 @@ Imath::Box2i dataWindow(int width, int height, const std::optional<Image::Displa
 
 /// The header that all of our OpenEXR files have in common: windows, camera, colours, metadata.
 Imf::Header exrHeader(int width, int height, const std::optional<Image::Display>& display,
-                      const Camera& camera, const std::map<std::string, std::string>& metadata);
+                      const ImageCamera& camera, const std::map<std::string, std::string>& metadata);
 
 }  // namespace nephele::detail

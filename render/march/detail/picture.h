@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "nephele/render/image/deep_image.h"
 #include "nephele/render/light/baked_light.h"
+#include "nephele/render/march/detail/deep_pixel.h"
 #include "nephele/render/march/field_march.h"
 #include "nephele/render/march/film.h"
 #include "nephele/render/march/march_kernels.h"
