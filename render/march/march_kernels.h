@@ -90,7 +90,4 @@ void marchSteps(const MarchScene& scene, std::span<const MarchRay> rays,
                 std::span<const std::span<const MarchStep>> steps, std::span<MarchResult> results,
                 std::span<MarchRecord> records = {});
 
-/// The same sample by sample: the truth that marchRays is tested against.
-void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results);
-
 }  // namespace nephele

@@ -24,7 +24,7 @@ struct MarchScene {
     const float* values = nullptr;
     const std::int32_t* table = nullptr;
     Vec3i count{};
-    /// See CodedBricks. Of the density and the suns marchRays reads these, and marchRaysScalar the values.
+    /// See CodedBricks. Of the density and the suns marchRays reads these and not the values.
     const float* pairs = nullptr;
     const CodedBricks::Entry* entries = nullptr;
   };

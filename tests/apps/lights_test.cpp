@@ -6,6 +6,7 @@
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
+#include "nephele/render/scene/camera.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 

@@ -9,6 +9,7 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
+#include "nephele/render/scene/camera.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 

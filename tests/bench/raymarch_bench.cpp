@@ -11,6 +11,7 @@
 #include "nephele/render/march/raymarch.h"
 #include "tests/support/density.h"
 #include "tests/support/march_scene.h"
+#include "tests/support/scalar_march.h"
 
 namespace nephele {
 namespace {
@@ -81,7 +82,9 @@ void marchVectors(benchmark::State& state) {
 }
 void marchScalar(benchmark::State& state) {
   march(state, {shell(128), 3, float(state.range(0))},
-        [](const auto& scene, const auto& rays, auto& results) { marchRaysScalar(scene, rays, results); });
+        [](const auto& scene, const auto& rays, auto& results) {
+          test::marchRaysScalar(scene, rays, results);
+        });
 }
 // One tile of a picture through thin smoke, single scattering, again and again, so that what it reads fits
 // into the second-level cache: what a sample costs at least.

@@ -9,6 +9,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/png_io.h"
+#include "nephele/render/scene/camera.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 

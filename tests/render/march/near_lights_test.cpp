@@ -11,6 +11,7 @@
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
 #include "tests/support/march_scene.h"
+#include "tests/support/scalar_march.h"
 
 namespace nephele {
 namespace {
@@ -302,7 +303,7 @@ TEST(NearLights, VectorsAgreeWithTheScalarLoop) {
       local.shadow[2] = coloured ? 2.0f : 1.0f;
     }
     std::vector<MarchResult> expected(rays.size());
-    marchRaysScalar(scene, rays, expected);
+    test::marchRaysScalar(scene, rays, expected);
     test::forEachTarget([&] {
       std::vector<MarchResult> results(rays.size());
       marchRays(scene, rays, results);

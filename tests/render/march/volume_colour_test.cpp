@@ -10,6 +10,7 @@
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
 #include "tests/support/march_scene.h"
+#include "tests/support/scalar_march.h"
 
 namespace nephele {
 namespace {
@@ -290,7 +291,7 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
   for (const float extinction : {0.05f, 2.0f, 40.0f}) {
     scene.extinction = extinction;
     std::vector<MarchResult> expected(rays.size());
-    marchRaysScalar(scene, rays, expected);
+    test::marchRaysScalar(scene, rays, expected);
     test::forEachTarget([&] {
       std::vector<MarchResult> results(rays.size());
       marchRays(scene, rays, results);

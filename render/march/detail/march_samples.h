@@ -1,0 +1,255 @@
+// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+#if defined(NEPHELE_MARCH_SAMPLES) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHELE_MARCH_SAMPLES
+#undef NEPHELE_MARCH_SAMPLES
+#else
+#define NEPHELE_MARCH_SAMPLES
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/render/march/detail/march_lanes.h"
+#include "nephele/render/volume/march_scene.h"
+
+/// Look-ups of the march, a vector of points at a time: dense lattices, plain bricks and coded ones.
+HWY_BEFORE_NAMESPACE();
+namespace nephele::HWY_NAMESPACE {
+
+// Keeps the compiler from taking a stored vector apart in registers, which costs more than loading its parts.
+HWY_INLINE const volatile std::int32_t* inMemory(const std::int32_t* stored) {
+  return stored;
+}
+
+// The numbers at[n][offset] and at[n][offset + 1] of as many places as half a vector has lanes.
+template <class D>
+HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offset) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Set(d, at[0][offset]);
+#else
+  if constexpr (hn::MaxLanes(D()) == 2) {
+    return hn::LoadU(d, at[0] + offset);
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+  } else if constexpr (hn::MaxLanes(D()) == 4) {
+    const auto* first = reinterpret_cast<const __m128i*>(at[0] + offset);
+    const auto* second = reinterpret_cast<const __m64*>(at[1] + offset);
+    return hn::Vec<D>{_mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64(first)), second)};
+#endif
+  } else {
+    const hn::Half<D> half;
+    constexpr int quarter = int(hn::MaxLanes(D())) / 4;
+    return hn::Combine(d, pairsAt(half, at + quarter, offset), pairsAt(half, at, offset));
+  }
+#endif
+}
+
+// Numbers at the eight corners of cells, as pairs along x of the first half of the lanes and of the second.
+struct Corners {
+  Floats pairs[4][2];
+};
+
+HWY_INLINE Floats alongX(Floats low, Floats high, Floats share) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::MulAdd(share, hn::Sub(high, low), low);
+#else
+  const Lanes d;
+  const Floats first = hn::ConcatEven(d, high, low), second = hn::ConcatOdd(d, high, low);
+  return hn::MulAdd(share, hn::Sub(second, first), first);
+#endif
+}
+
+HWY_INLINE Floats between(const Corners& corners, Point f) {
+  const auto edge = [&](int n) HWY_ATTR { return alongX(corners.pairs[n][0], corners.pairs[n][1], f.x); };
+  const Floats near0 = edge(0), near1 = edge(1), far0 = edge(2), far1 = edge(3);
+  const Floats nearFace = hn::MulAdd(f.y, hn::Sub(near1, near0), near0);
+  const Floats farFace = hn::MulAdd(f.y, hn::Sub(far1, far0), far0);
+  return hn::MulAdd(f.z, hn::Sub(farFace, nearFace), nearFace);
+}
+
+// The corners of cells whose first nodes are at addressOf(lane). Made of plain loads, as many at a time as
+// addresses fit into registers: gather instructions take several times as long on many processors.
+template <class AddressOf>
+HWY_INLINE Corners cornersAt(int strideY, int strideZ, AddressOf&& addressOf) {
+  const Lanes d;
+  Corners corners;
+#if HWY_TARGET == HWY_SCALAR
+  const float* at = addressOf(0);
+  const int offsets[4] = {0, strideY, strideZ, strideZ + strideY};
+  for (int n = 0; n != 4; ++n)
+    for (int part = 0; part != 2; ++part) corners.pairs[n][part] = hn::Set(d, at[offsets[n] + part]);
+#else
+  for (int part = 0; part != 2; ++part) {
+    const float* at[kLanes / 2];
+    for (int n = 0; n != kLanes / 2; ++n) at[n] = addressOf(part * (kLanes / 2) + n);
+    corners.pairs[0][part] = pairsAt(d, at, 0);
+    corners.pairs[1][part] = pairsAt(d, at, strideY);
+    corners.pairs[2][part] = pairsAt(d, at, strideZ);
+    corners.pairs[3][part] = pairsAt(d, at, strideZ + strideY);
+  }
+#endif
+  return corners;
+}
+
+// Cells of a dense lattice of nodes: their first nodes, and how far beyond these points lie.
+struct Cells {
+  alignas(64) std::int32_t node[kLanes];
+  Point share;
+  int strideY, strideZ;
+};
+
+// Those around p, all >= 0 and within the lattice.
+HWY_INLINE void locate(const Vec3i& size, Point p, Cells& cells) {
+  const IntLanes i;
+  const Floats x = hn::Floor(p.x), y = hn::Floor(p.y), z = hn::Floor(p.z);
+  cells.strideY = size.x;
+  cells.strideZ = size.x * size.y;
+  hn::Store(hn::Add(wholeOf(x), hn::Add(hn::Mul(wholeOf(y), hn::Set(i, cells.strideY)),
+                                        hn::Mul(wholeOf(z), hn::Set(i, cells.strideZ)))),
+            i, cells.node);
+  cells.share = {hn::Sub(p.x, x), hn::Sub(p.y, y), hn::Sub(p.z, z)};
+}
+
+HWY_INLINE Floats read(const float* HWY_RESTRICT values, const Cells& cells) {
+  const Corners corners = cornersAt(cells.strideY, cells.strideZ,
+                                    [&](int n) HWY_ATTR { return values + inMemory(cells.node)[n]; });
+  return between(corners, cells.share);
+}
+
+// Where points lie in bricks: entry of the table, first node of the cell in the brick, and how far beyond it.
+struct Places {
+  alignas(64) std::int32_t entry[kLanes], node[kLanes];
+  Point share;
+};
+
+constexpr float kJustBelow1 = 1.0f - 0x1p-24f;
+
+template <int kWidth>
+HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places) {
+  const Lanes d;
+  const IntLanes i;
+  const auto within = [&](Floats x, int count) HWY_ATTR {
+    // Just under the end, so that a point on the far face still lies in the last cell.
+    return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, 8.0f * float(count) * kJustBelow1));
+  };
+  const Point q{within(p.x, bricks.count.x), within(p.y, bricks.count.y), within(p.z, bricks.count.z)};
+  const Point cell{hn::Floor(q.x), hn::Floor(q.y), hn::Floor(q.z)};
+  const Ints x = wholeOf(cell.x), y = wholeOf(cell.y), z = wholeOf(cell.z);
+  const Ints row = hn::Add(hn::Mul(hn::ShiftRight<3>(z), hn::Set(i, bricks.count.y)), hn::ShiftRight<3>(y));
+  hn::Store(hn::Add(hn::Mul(row, hn::Set(i, bricks.count.x)), hn::ShiftRight<3>(x)), i, places.entry);
+  const Ints inside = hn::Set(i, 7), width = hn::Set(i, kWidth);
+  const Ints line = hn::Add(hn::Mul(hn::And(z, inside), width), hn::And(y, inside));
+  hn::Store(hn::Add(hn::Mul(line, width), hn::And(x, inside)), i, places.node);
+  places.share = {hn::Sub(q.x, cell.x), hn::Sub(q.y, cell.y), hn::Sub(q.z, cell.z)};
+}
+
+template <int kWidth, int kBefore>
+HWY_INLINE Floats read(const MarchScene::Bricks& bricks, const Places& places) {
+  constexpr int kPlane = kWidth * kWidth;
+  const float* first = bricks.values + kBefore * (kPlane + kWidth + 1);
+  const Corners corners = cornersAt(kWidth, kPlane, [&](int n) HWY_ATTR {
+    return first + std::ptrdiff_t(bricks.table[inMemory(places.entry)[n]]) * (kPlane * kWidth) +
+           inMemory(places.node)[n];
+  });
+  return between(corners, places.share);
+}
+
+template <int kWidth, int kBefore>
+HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
+  Places places;
+  locate<kWidth>(bricks, p, places);
+  return read<kWidth, kBefore>(bricks, places);
+}
+
+// At places in coded bricks; nothing is below 0.
+HWY_INLINE Floats readCoded(const MarchScene::Bricks& bricks, const Places& places) {
+  const Lanes d;
+  // As in Corners, the two rows of a cell; and what belongs to the brick.
+  Floats rows[2][2], entries[2];
+#if HWY_TARGET == HWY_SCALAR
+  const CodedBricks::Entry& entry = bricks.entries[places.entry[0]];
+  const float* at = bricks.pairs + (entry.first + std::uint32_t(places.node[0]));
+  for (int part = 0; part != 2; ++part) {
+    rows[0][part] = hn::Set(d, at[part]);
+    rows[1][part] = hn::Set(d, at[CodedBricks::kWidth + part]);
+    entries[part] = hn::Set(d, entry.unit);
+  }
+#else
+  static_assert(sizeof(CodedBricks::Entry) == 2 * sizeof(float));
+  for (int part = 0; part != 2; ++part) {
+    const float *at[kLanes / 2], *own[kLanes / 2];
+    for (int n = 0; n != kLanes / 2; ++n) {
+      const int lane = part * (kLanes / 2) + n;
+      const CodedBricks::Entry* entry = bricks.entries + inMemory(places.entry)[lane];
+      own[n] = reinterpret_cast<const float*>(entry);
+      at[n] = bricks.pairs + (entry->first + std::uint32_t(inMemory(places.node)[lane]));
+    }
+    entries[part] = pairsAt(d, own, 0);
+    rows[0][part] = pairsAt(d, at, 0);
+    rows[1][part] = pairsAt(d, at, CodedBricks::kWidth);
+  }
+#endif
+  const auto alongZ = [&](Floats pairs) HWY_ATTR {
+    const IntLanes i;
+    const hn::RebindToUnsigned<Lanes> u;
+    const auto bits = hn::BitCast(u, pairs);
+    const Floats near = hn::ConvertTo(d, hn::BitCast(i, hn::And(bits, hn::Set(u, 0xffffu)))),
+                 far = hn::ConvertTo(d, hn::BitCast(i, hn::ShiftRight<16>(bits)));
+    return hn::MulAdd(places.share.z, hn::Sub(far, near), near);
+  };
+  const auto alongRow = [&](const Floats(&row)[2]) HWY_ATTR {
+    const Floats first = alongZ(firstOf(row[0], row[1])), second = alongZ(secondOf(row[0], row[1]));
+    return hn::MulAdd(places.share.x, hn::Sub(second, first), first);
+  };
+  const Floats low = alongRow(rows[0]), high = alongRow(rows[1]);
+  const Floats code = hn::MulAdd(places.share.y, hn::Sub(high, low), low);
+  const Floats above = hn::Max(hn::Sub(code, hn::Set(d, CodedBricks::kZero)), hn::Zero(d));
+  return hn::Mul(above, secondOf(entries[0], entries[1]));
+}
+
+// Places in coded bricks of as many samples as a block has, at distances s along a ray. All are found before
+// the first value is read, so that the processor need not wait for one vector before it starts the next.
+template <int kSize>
+HWY_INLINE void locateBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
+                            const float* HWY_RESTRICT s, Places (&places)[kSize / kLanes]) {
+  for (int v = 0; v != kSize / kLanes; ++v)
+    locate<CodedBricks::kWidth>(bricks, pointAt(ray, hn::Load(Lanes(), s + v * kLanes)), places[v]);
+}
+
+template <int kSize>
+HWY_INLINE void readBlock(const MarchScene::Bricks& bricks, const Places (&places)[kSize / kLanes],
+                          float* HWY_RESTRICT values) {
+  for (int v = 0; v != kSize / kLanes; ++v)
+    hn::Store(readCoded(bricks, places[v]), Lanes(), values + v * kLanes);
+}
+
+template <int kSize>
+HWY_INLINE void sampleBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
+                            const float* HWY_RESTRICT s, float* HWY_RESTRICT values) {
+  Places places[kSize / kLanes];
+  locateBlock<kSize>(bricks, ray, s, places);
+  readBlock<kSize>(bricks, places, values);
+}
+
+// Three values at once, at p within bricks that are laid out as the density's.
+HWY_INLINE void sampleColour(const MarchScene::ColourBricks& bricks, Point p, Floats (&out)[3]) {
+  for (int c = 0; c != 3; ++c)
+    out[c] = hn::Max(sampleBricks<BrickGrid::kWidth, BrickGrid::kBefore>(
+                         {bricks.values[c], bricks.table, bricks.count}, p),
+                     hn::Zero(Lanes()));
+}
+
+HWY_INLINE Point clamped(Point p, const Vec3i& size) {
+  const Lanes d;
+  const auto within = [&](Floats x, int count) HWY_ATTR {
+    return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, float(count - 1) - 1e-3f));
+  };
+  return {within(p.x, size.x), within(p.y, size.y), within(p.z, size.z)};
+}
+
+}  // namespace nephele::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
