@@ -2,10 +2,14 @@
 
 PACKAGES := $(shell cat cmake/packages.txt)
 FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
+LINT_PACKAGES := clang-format
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
+PREFIX := /usr/local
+# ON: warnings end the build.
+STRICT := OFF
 
-.PHONY: all deps build demo test test-farm bench docs format lint clean
+.PHONY: all deps build demo test test-sanitized test-farm bench docs format lint install clean
 
 all: build
 
@@ -22,10 +26,17 @@ demo: build
 	sh data/demo.sh build/bin/nephele $(RESULTS)
 
 test: deps
-	cmake --preset release -DNEPHELE_BUILD_TESTS=ON -DNEPHELE_BUILD_BENCHMARKS=OFF
+	cmake --preset release -DNEPHELE_BUILD_TESTS=ON -DNEPHELE_BUILD_BENCHMARKS=OFF -DNEPHELE_WARNINGS_AS_ERRORS=$(STRICT)
 	cmake --build build
 	sh tests/check_includes.sh
 	ctest --test-dir build --output-on-failure --parallel 2
+
+# The tests of grids, meshes and files once more, under AddressSanitizer and UndefinedBehaviorSanitizer.
+test-sanitized: deps
+	cmake --preset asan -DNEPHELE_BUILD_APPS=OFF -DNEPHELE_BUILD_TESTS=ON
+	cmake --build build-asan --target nephele_grids_tests
+	LSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/lsan_suppressions.txt \
+	  build-asan/bin/nephele_grids_tests --gtest_brief=1
 
 # Starts a Slurm of its own, as root; not part of `make test`.
 test-farm: build
@@ -45,8 +56,14 @@ format:
 	clang-format -i $$(git ls-files '*.h' '*.cpp')
 
 lint:
+	@dpkg -s $(LINT_PACKAGES) >/dev/null 2>&1 || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(LINT_PACKAGES)
 	clang-format --dry-run --Werror $$(git ls-files '*.h' '*.cpp')
 	sh tests/check_includes.sh
+
+# Libraries, headers, CMake package and program, e.g. make install PREFIX=$$HOME/nephele
+install: build
+	cmake --install build --prefix $(PREFIX)
 
 clean:
 	rm -rf build build-debug build-asan build-tsan bench-results

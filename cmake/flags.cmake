@@ -4,9 +4,6 @@ target_compile_options(nephele_flags INTERFACE
   -fno-math-errno -fno-trapping-math -ffp-contract=off
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
   $<$<BOOL:${NEPHELE_WARNINGS_AS_ERRORS}>:-Werror>)
-target_include_directories(nephele_flags INTERFACE ${PROJECT_SOURCE_DIR})
-
-set(CMAKE_CXX_FLAGS_RELEASE "-O3")
 
 if(NEPHELE_SANITIZE STREQUAL "address")
   add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)
@@ -17,3 +14,7 @@ elseif(NEPHELE_SANITIZE STREQUAL "thread")
 elseif(NEPHELE_SANITIZE)
   message(FATAL_ERROR "NEPHELE_SANITIZE must be empty, address or thread, got '${NEPHELE_SANITIZE}'")
 endif()
+
+# The standard headers that nearly every source of ours includes, compiled once for each target.
+set(NEPHELE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <optional> <span>
+  <string> <utility> <vector>)

@@ -1,22 +1,83 @@
 #!/bin/sh
-# Dependencies run modeling <- levelset <- render <- apps, and the mathematics knows no file or grid library.
+# Who may include whom: parts run modeling <- levelset <- render <- apps, the rooms inside a part run one way, what lies in a
+# room's detail/ stays in that room and out of its public headers, and heavy libraries are seen where they belong.
 set -u
 cd "$(dirname "$0")/.."
 failed=0
 
-# forbid FOLDER PATTERN MEANING
-forbid() {
-  if grep -rnE "#include *[<\"]($2)" "$1" --include='*.h' --include='*.cpp'; then
-    echo "error: $1/ $3" >&2
+# Every room, and the rooms that it may include; tests and apps may include all.
+rooms='
+modeling/base
+modeling/field    modeling/base
+modeling/noise    modeling/base modeling/field
+modeling/shape    modeling/base modeling/field modeling/noise
+modeling/cloud    modeling/base modeling/field modeling/noise modeling/shape
+levelset/grid     modeling
+levelset/mesh     modeling levelset/grid
+levelset/io       modeling levelset/grid levelset/mesh
+levelset/cloud    modeling levelset/grid levelset/mesh levelset/io
+levelset/flow     modeling levelset/grid levelset/mesh levelset/io
+levelset/cut      modeling levelset/grid levelset/mesh levelset/io
+levelset/warp     modeling levelset/grid levelset/mesh levelset/io
+render/image      modeling levelset
+render/scene      modeling levelset render/image
+render/volume     modeling levelset render/image render/scene
+render/light      modeling levelset render/image render/scene render/volume
+render/march      modeling levelset render/image render/scene render/volume render/light
+render/preview    modeling levelset render/image render/scene render/volume render/light render/march
+'
+
+grep -rn --include='*.h' --include='*.cpp' '^ *#include *"' modeling levelset render apps tests |
+  ROOMS="$rooms" awk '
+    function fail(message) { print "error: " at ": " message " (" included ")"; bad = 1 }
+    function roomOf(path,  part) { split(path, part, "/"); return part[1] "/" part[2] }
+    BEGIN {
+      count = split(ENVIRON["ROOMS"], line, "\n")
+      for (i = 1; i <= count; ++i) {
+        size = split(line[i], word, " ")
+        for (k = 1; k <= size; ++k) may[word[1], word[k]] = 1
+        if (size) known[word[1]] = 1
+      }
+    }
+    {
+      split($0, field, ":")
+      file = field[1]; at = field[1] ":" field[2]
+      included = $0; sub(/^[^"]*"/, "", included); sub(/".*/, "", included)
+      from = roomOf(file); isRoom = from in known; part = substr(from, 1, index(from, "/") - 1)
+      if ((part == "modeling" || part == "levelset" || part == "render") && !isRoom) fail("not in a room")
+      if (included !~ /^nephele\//) {
+        if (included ~ /^(modeling|levelset|render)\//) fail("include it as nephele/...")
+        if (isRoom && included ~ /^(apps|tests)\//) fail("a library must not include from apps/ or tests/")
+        next
+      }
+      target = substr(included, 9); to = roomOf(target)
+      if (!(to in known)) fail("no such room")
+      if (isRoom && from != to && !((from, to) in may) && !((from, substr(to, 1, index(to, "/") - 1)) in may))
+        fail(from " must not include from " to)
+      if (index(target, "/detail/") && from != to) {
+        mirrored = file; sub(/^tests\//, "", mirrored)
+        if (mirrored == file) fail("detail/ of another room")
+      }
+      if (isRoom && index(target, "/detail/") && file ~ /\.h$/ && !index(file, "/detail/"))
+        fail("a public header must not include detail/")
+    }
+    END { exit bad }' || failed=1
+
+# onlyIn PATTERN PLACES MEANING
+onlyIn() {
+  if grep -rnE --include='*.h' --include='*.cpp' "#include *<($1)" modeling levelset render apps | grep -vE "^($2)"; then
+    echo "error: $3" >&2
     failed=1
   fi
 }
 
-forbid modeling '(levelset|render|apps)/' 'must not include from the folders that stand on it'
-forbid modeling '(openvdb|nanovdb|CGAL|OpenMesh|embree|OpenEXR|Imf|OpenImageIO|assimp)' \
-  'must not include grid, mesh or image libraries'
-forbid levelset '(render|apps)/' 'must not include from render/ or apps/'
-forbid render 'apps/' 'must not include from apps/'
+onlyIn '(openvdb|nanovdb)/' 'levelset/' 'OpenVDB is for levelset/ alone'
+onlyIn 'CGAL/' 'levelset/(mesh|cut)/' 'CGAL is for levelset/mesh and levelset/cut alone'
+onlyIn 'OpenMesh/' 'levelset/(mesh|warp)/' 'OpenMesh is for levelset/mesh and levelset/warp alone'
+onlyIn 'embree' 'levelset/mesh/|render/scene/' 'Embree is for levelset/mesh and render/scene alone'
+onlyIn '(OpenEXR|Imf|Imath)' 'render/image/' 'OpenEXR is for render/image alone'
+onlyIn '(CLI|toml\+\+)/' 'apps/' 'CLI11 and toml++ are for apps/ alone'
+onlyIn '(fftw3|kissfft)' 'modeling/noise/|levelset/flow/' 'Fourier transforms are for modeling/noise and levelset/flow alone'
 
 [ "$failed" -eq 0 ] && echo "include directions: good"
 exit "$failed"

@@ -20,7 +20,7 @@
 #include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "levelset/grid/grid_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/levelset/grid/grid_kernels.cpp"
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>

@@ -5,7 +5,7 @@
 // from the triangle's box or plane are left out. The operations of both forms are the same in the same order,
 // without contraction.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "levelset/mesh/triangle_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/levelset/mesh/triangle_kernels.cpp"
 #include "nephele/levelset/mesh/triangle_kernels.h"
 
 #include <hwy/foreach_target.h>

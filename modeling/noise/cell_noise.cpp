@@ -16,7 +16,7 @@
 #include "nephele/modeling/noise/lattice_noise.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/noise/cell_noise.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/noise/cell_noise.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>

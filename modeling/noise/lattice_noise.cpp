@@ -18,7 +18,7 @@
 #include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/noise/lattice_noise.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/noise/lattice_noise.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>

@@ -11,7 +11,7 @@
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "render/march/march_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/render/march/march_kernels.cpp"
 #include "nephele/render/march/march_kernels.h"
 
 #include <hwy/foreach_target.h>

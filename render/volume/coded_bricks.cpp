@@ -8,7 +8,7 @@
 //
 // Limits: bricks are addressed by 32 bits.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "render/volume/coded_bricks.cpp"
+#define HWY_TARGET_INCLUDE "nephele/render/volume/coded_bricks.cpp"
 #include "nephele/render/volume/coded_bricks.h"
 
 #include <hwy/foreach_target.h>

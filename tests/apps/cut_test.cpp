@@ -1,8 +1,12 @@
 // The verb cut, through the program.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -581,7 +585,7 @@ TEST_F(CutVerb, AFullDiskLeavesNothing) {
 TEST_F(CutVerb, AnInterruptLeavesAllOrNothing) {
   const std::string input = meshFile("fine.ply", icosphere(1, 5));
   // Sent once the folder is there, while its files are made.
-  std::ofstream(file("script")) << "'" << NEPHELE_PROGRAM << "' cut '" << input << "' --random-planes 30 -o '"
+  std::ofstream(file("script")) << "'" << programPath() << "' cut '" << input << "' --random-planes 30 -o '"
                                 << file("out") << "' >/dev/null 2>&1 &\nid=$!\nwhile [ ! -d '" << file("out")
                                 << "' ] && kill -0 $id; do :; done\nkill -INT $id\nwait $id\n";
   const int status = WEXITSTATUS(std::system(("sh '" + file("script") + "' 2>/dev/null").c_str()));

@@ -1,13 +1,16 @@
 // The verb turntable, through the program.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
@@ -394,7 +397,7 @@ TEST_F(TurntableVerb, EndsCleanlyOnSignalsAndResumes) {
   for (const auto& [signal, code] : {std::pair{"INT", 130}, {"TERM", 143}, {"KILL", 137}}) {
     // Sent once the second frame is there; the whole would take minutes.
     std::ofstream(folder.file("script"))
-        << "'" << NEPHELE_PROGRAM << "' " << call("--frames 1-2000", "club.vdb", 64) << " 2>'"
+        << "'" << programPath() << "' " << call("--frames 1-2000", "club.vdb", 64) << " 2>'"
         << folder.file("err") << "' >/dev/null &\nid=$!\nwhile [ ! -e '" << frame(2)
         << "' ] && kill -0 $id; do sleep 0.02; done\nkill -" << signal << " $id\nwait $id\n";
     const int status = std::system(("sh '" + folder.file("script") + "' 2>/dev/null").c_str());

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"

@@ -8,9 +8,7 @@
 namespace nephele::test {
 
 /// Path of a file of the shared test data beside the checkout, e.g. "meshes/spot_uv.obj".
-inline std::string sharedData(const std::string& name) {
-  return (std::filesystem::path(NEPHELE_SOURCE_DIR).parent_path() / "shared/data" / name).string();
-}
+std::string sharedData(const std::string& name);
 
 }  // namespace nephele::test
 

@@ -3,7 +3,7 @@
 // Comparisons and choices are those of std::min and std::max in the same order, so that the vector code gives
 // the bits of the plain loops, NaN and zeros of both signs included.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "levelset/cut/detail/cut_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/levelset/cut/detail/cut_kernels.cpp"
 #include "nephele/levelset/cut/detail/cut_kernels.h"
 
 #include <hwy/foreach_target.h>

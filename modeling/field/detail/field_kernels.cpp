@@ -12,7 +12,7 @@
 #include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/field/detail/field_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/field/detail/field_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what they define.
 #include <hwy/contrib/math/math-inl.h>

@@ -14,7 +14,7 @@
 #include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/noise/detail/noise_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/noise/detail/noise_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what it defines.
 #include <hwy/highway.h>

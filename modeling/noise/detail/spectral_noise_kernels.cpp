@@ -8,7 +8,7 @@
 #include "nephele/modeling/noise/detail/spectral_noise.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/noise/detail/spectral_noise_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/noise/detail/spectral_noise_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>

@@ -1,7 +1,7 @@
 // The inner loops of LightVolume's sweep, in the widest vectors that the machine has. Nothing is summed
 // across lanes and nothing is contracted, so that every width gives the same bits.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "render/light/detail/light_slices.cpp"
+#define HWY_TARGET_INCLUDE "nephele/render/light/detail/light_slices.cpp"
 #include "nephele/render/light/detail/light_slices.h"
 
 #include <hwy/foreach_target.h>

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 
@@ -16,6 +17,7 @@ namespace nephele {
 namespace {
 
 using test::KnownMesh;
+using test::ownData;
 using test::sharedData;
 using test::TemporaryFolder;
 
@@ -315,7 +317,7 @@ TEST(MeshIo, GltfVertexColoursBecomeColor) {
 
 TEST(MeshIo, PaintedMeshOfThisProjectHasItsAttributes) {
   // Painted by data/paint_mesh.py with "amplitude = ramp(h, 0.1, 0.6)" and others; ramp is 3 t^2 - 2 t^3.
-  const Mesh mesh = readMesh(std::string(NEPHELE_SOURCE_DIR) + "/data/cloud_base_painted.ply");
+  const Mesh mesh = readMesh(ownData("data/cloud_base_painted.ply"));
   const MeshAttribute* amplitude = find(mesh, "amplitude");
   ASSERT_NE(amplitude, nullptr);
   ASSERT_NE(find(mesh, "billow"), nullptr);

@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <random>
 
 #include "nephele/levelset/io/mesh_io.h"

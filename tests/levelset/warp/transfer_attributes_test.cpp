@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <numbers>
 
 #include "nephele/levelset/io/mesh_io.h"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/exr_io.h"

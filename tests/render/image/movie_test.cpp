@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "nephele/modeling/base/error.h"
 #include "tests/support/run_program.h"
