@@ -5,7 +5,7 @@
 #include "nephele/modeling/field/detail/field_kernels.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/field/detail/vector_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/field/detail/vector_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>

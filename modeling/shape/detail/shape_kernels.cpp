@@ -3,7 +3,7 @@
 #include "nephele/modeling/shape/detail/shape_kinds.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "modeling/shape/detail/shape_kernels.cpp"
+#define HWY_TARGET_INCLUDE "nephele/modeling/shape/detail/shape_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as it decides what it defines.
 #include <hwy/highway.h>
