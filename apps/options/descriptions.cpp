@@ -48,7 +48,7 @@ Description meshDescription(const std::string& path, bool alwaysCountPairs) {
   for (const MeshGroup& g : mesh.groups) d["groups"].push_back({{"name", g.name}, {"faces", g.faceCount}});
   d["merged_vertices"] = is.mergedVertices;
   if (alwaysCountPairs || is.triangles <= kMostTriangles)
-    d["self_intersections"] = countSelfIntersections(mesh);
+    if (const auto count = countSelfIntersections(mesh)) d["self_intersections"] = *count;
   d["problems"] = is.problems();
   return d;
 }

@@ -167,7 +167,7 @@ class Pairs {
 
 }  // namespace
 
-std::size_t countSelfIntersections(const Mesh& mesh) {
+std::optional<std::size_t> countSelfIntersections(const Mesh& mesh) {
   const Mesh triangles = triangulated(detail::withMergedPositions(mesh));
   const Pairs pairs(triangles);
   const BoxTree tree(pairs.boxes());
@@ -179,7 +179,7 @@ std::size_t countSelfIntersections(const Mesh& mesh) {
       tree.forPairs(leaf, [&](std::uint32_t f, std::uint32_t g) { found += pairs.intersect(f, g); });
     count += found;
   });
-  return count;
+  return count.load();
 }
 
 }  // namespace nephele

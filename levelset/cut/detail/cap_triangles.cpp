@@ -1,22 +1,14 @@
-// Triangles of flat regions.
-//
-// CGAL's constrained Delaunay triangulation with exact predicates. The region is found by a flood from
-// outside that counts the directed edges it crosses. Where rounding makes edges cross there is no such
-// triangulation; cutting ears off each loop then gives triangles that fit its neighbours in every case, some
-// of them folded over by as much as the rounding.
+// Triangles of single loops: what a constrained Delaunay triangulation cannot do where rounding makes edges
+// cross. Cutting ears off each loop gives triangles that fit its neighbours in every case, some of them
+// folded over by as much as the rounding.
 #include "nephele/levelset/cut/detail/cap_triangles.h"
-
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include <algorithm>
 #include <limits>
 
-#include "nephele/levelset/cut/detail/constrained_delaunay.h"
-
 namespace nephele::detail {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 double doubleArea(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
@@ -26,14 +18,6 @@ double squaredLength(const PlanePoint& a, const PlanePoint& b) {
 }
 
 }  // namespace
-
-std::optional<std::vector<std::array<std::uint32_t, 3>>> delaunayTriangles(
-    std::span<const PlanePoint> points, std::span<const std::array<std::uint32_t, 2>> edges) {
-  std::vector<Kernel::Point_2> places;
-  places.reserve(points.size());
-  for (const PlanePoint& p : points) places.emplace_back(p[0], p[1]);
-  return constrainedDelaunay<Kernel>(places, edges);
-}
 
 std::vector<std::array<std::uint32_t, 3>> bestTriangles(std::span<const PlanePoint> points,
                                                         std::span<const std::uint32_t> loop) {

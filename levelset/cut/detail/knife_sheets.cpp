@@ -348,7 +348,7 @@ std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSour
       Mesh mesh;
       mesh.positions = moved;
       for (const TriangleIndices& t : triangles) mesh.addFace(t);
-      require(signedVolume(mesh) > 0 && countSelfIntersections(mesh) == 0,
+      require(signedVolume(mesh) > 0 && countSelfIntersections(mesh).value_or(0) == 0,
               fmt::format("cut: a kerf of {} is too wide for {}: its sides cross themselves", options.kerf,
                           name));
       sheets.push_back(sheetOf(moved, triangles, name, knife));
