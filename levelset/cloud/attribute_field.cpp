@@ -90,9 +90,9 @@ class ClosestNode final : public FieldNode<float> {
     for (int i = 0; i < points.count; ++i)
       values[0][i] = surface_->at({points.x[i], points.y[i], points.z[i]}, cursor);
   }
-  Interval range(const Box& box) const override { return surface_->range(box); }
+  Interval range(const Box& box, RangeMemo&) const override { return surface_->range(box); }
   NodePtr<float> restricted(Restriction& restriction) const override {
-    return detail::constantFrom<float>(range(restriction.box));
+    return detail::constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override { return 1e-4f * surface_->nearest().box().longestSide(); }
 
@@ -120,7 +120,7 @@ class SpheresNode final : public FieldNode<float> {
       values[0][i] = std::isnan(sum) ? kNan : std::clamp(float(sum), all_.min, all_.max);
     }
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     const Interval closest = surface_->range(box);
     const std::optional<Interval> spheres = spheres_.near(box);
     // Blends of different numbers round.
@@ -130,7 +130,7 @@ class SpheresNode final : public FieldNode<float> {
     return {std::max(hull.min - rounding, all_.min), std::min(hull.max + rounding, all_.max)};
   }
   NodePtr<float> restricted(Restriction& restriction) const override {
-    return detail::constantFrom<float>(range(restriction.box));
+    return detail::constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override { return 1e-4f * surface_->nearest().box().longestSide(); }
 

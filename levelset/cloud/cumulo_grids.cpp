@@ -121,9 +121,9 @@ class GrownNode final : public FieldNode<float> {
     for (int i = 0; i < count; ++i) values[0][origin[i]] = before[i] + std::abs(grown[origin[i]]);
   }
 
-  Interval range(const Box& box) const override {
-    const Interval grown = displacement_->range(box);
-    return (grown.isPoint() ? level_->range(box) : before_->range(box)) + abs(grown);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const Interval grown = memo.of(displacement_, box);
+    return (grown.isPoint() ? memo.of(level_, box) : memo.of(before_, box)) + abs(grown);
   }
 
  private:
@@ -156,10 +156,10 @@ class NeededNode final : public FieldNode<float> {
     displacement_->eval(points, values, scratch);
   }
 
-  Interval range(const Box& box) const override {
-    const Interval range = displacement_->range(box);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const Interval range = memo.of(displacement_, box);
     if (range.isPoint()) return range;
-    const Interval level = level_->range(box);
+    const Interval level = memo.of(level_, box);
     const float missing = -level.max - detail::kOuterShare * margin_;
     // Wherever amplitudes are read from.
     if (level.max > 0 || leastReach_ >= missing) return range;
@@ -169,7 +169,7 @@ class NeededNode final : public FieldNode<float> {
     // Amplitudes in a box can take a search: the first often tell.
     float reach = 0;
     for (const Height& height : heights_) {
-      reach += height.amplitude->range(near).max * height.noiseBound;
+      reach += memo.of(height.amplitude, near).max * height.noiseBound;
       if (reach >= missing) return range;
     }
     return Interval::of(0);

@@ -37,7 +37,7 @@ class PieceLevelSetNode final : public FieldNode<float> {
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch&) const override {
     for (int i = 0; i < points.count; ++i) values[0][i] = valueAt({points.x[i], points.y[i], points.z[i]});
   }
-  Interval range(const Box&) const override { return {-level_.band(), level_.band()}; }
+  Interval range(const Box&, RangeMemo&) const override { return {-level_.band(), level_.band()}; }
   float differenceStep() const override { return level_.voxelSize(); }
 
  private:

@@ -213,7 +213,7 @@ class Baker {
       return true;
     }
     const Box box{position(inside.first), position(inside.last)};
-    const RangeOf<T> range = cell.node->range(box);
+    const RangeOf<T> range = RangeMemo().of(cell.node, box);
     Ranges ranges;
     for (int c = 0; c < kLanes; ++c) ranges[c] = detail::rangeComponent(range, c);
     const std::optional<Values> value = settledValue(ranges);
@@ -223,7 +223,8 @@ class Baker {
     }
     // A single brick costs less to evaluate than to simplify once more.
     if (cell.size > 1) {
-      Restriction restriction{box, {}};
+      RestrictionMemo memo;
+      Restriction restriction{box, memo};
       cell.node = restrictNode(cell.node, restriction);
     }
     return false;

@@ -88,7 +88,7 @@ class MemoNode final : public FieldNode<float> {
     field_->evalGrad(points, values, grads, scratch);
     if (auto* entry = table_->entryOf(points)) entry->keep(values[0]);
   }
-  Interval range(const Box& box) const override { return field_->range(box); }
+  Interval range(const Box& box, RangeMemo& memo) const override { return memo.of(field_, box); }
   NodePtr<float> restricted(Restriction& restriction) const override {
     // A simpler field for a part of space costs less to evaluate, but is not remembered.
     const NodePtr<float> field = restrictNode(field_, restriction);

@@ -122,9 +122,9 @@ class GridNode final : public FieldNode<float> {
                 Scratch&) const override {
     sampler_.evalGrad(points, values[0], grads);
   }
-  Interval range(const Box& box) const override { return sampler_.range(box); }
+  Interval range(const Box& box, RangeMemo&) const override { return sampler_.range(box); }
   NodePtr<float> restricted(Restriction& restriction) const override {
-    return detail::constantFrom<float>(range(restriction.box));
+    return detail::constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override { return grid()->voxelSize; }
 
@@ -144,7 +144,7 @@ class RangedNode final : public FieldNode<float> {
                 Scratch& scratch) const override {
     field_->evalGrad(points, values, grads, scratch);
   }
-  Interval range(const Box& box) const override { return ranges_->range(box); }
+  Interval range(const Box& box, RangeMemo&) const override { return ranges_->range(box); }
   NodePtr<float> restricted(Restriction& restriction) const override {
     const NodePtr<float> field = restrictNode(field_, restriction);
     return field == field_ ? nullptr : std::make_shared<RangedNode>(ranges_, field);
@@ -172,11 +172,11 @@ class VectorGridNode final : public FieldNode<Vec3f> {
     for (int c = 0; c < 3; ++c)
       samplers_[c].evalGrad(points, values[c], {grads[3 * c], grads[3 * c + 1], grads[3 * c + 2]});
   }
-  RangeOf<Vec3f> range(const Box& box) const override {
+  RangeOf<Vec3f> range(const Box& box, RangeMemo&) const override {
     return {samplers_[0].range(box), samplers_[1].range(box), samplers_[2].range(box)};
   }
   NodePtr<Vec3f> restricted(Restriction& restriction) const override {
-    return detail::constantFrom<Vec3f>(range(restriction.box));
+    return detail::constantFrom<Vec3f>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override {
     return std::fmin(samplers_[0].grid()->voxelSize,

@@ -72,7 +72,7 @@ class ExactDistanceNode final : public FieldNode<float> {
                 Scratch&) const override {
     evaluate(points, values[0], &grads);
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     if (box.isEmpty() || !isFinite(box.min) || !isFinite(box.max)) return Interval::everything();
     const Vec3f middle = box.center();
     const double reach = 0.5 * length(Vec3d(box.size()));

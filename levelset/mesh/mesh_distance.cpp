@@ -85,7 +85,7 @@ class MeshDistanceNode final : public FieldNode<float> {
     clampValues(points.count, values[0], &grads);
   }
 
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     const Interval everything{-levels_->exteriorBand, levels_->interiorBand};
     if (box.isEmpty() || !isFinite(box.min) || !isFinite(box.max)) return everything;
     // Distance changes by no more than the way from the middle of each eighth; interpolation adds less than a
@@ -109,7 +109,7 @@ class MeshDistanceNode final : public FieldNode<float> {
   }
 
   NodePtr<float> restricted(Restriction& restriction) const override {
-    const Interval values = range(restriction.box);
+    const Interval values = range(restriction.box, restriction.memo.ranges);
     const float most = values.magnitude();
     const float least = values.contains(0.0f) ? 0.0f : std::min(std::abs(values.min), std::abs(values.max));
     std::size_t first = first_, last = last_;

@@ -222,7 +222,7 @@ class ClosestPointNode final : public FieldNode<Vec3f> {
     }
   }
 
-  std::array<Interval, 3> range(const Box&) const override {
+  std::array<Interval, 3> range(const Box&, RangeMemo&) const override {
     return rangeOf(mesh_.box().expanded(differenceStep()));
   }
 

@@ -216,16 +216,16 @@ class GriddedNode final : public FieldNode<float> {
     }
     finish(points, values, scratch);
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo& memo) const override {
     // Interpolation reads no farther than this.
-    const Interval near = elsewhere_->range(box.expanded(2 * grid_->voxelSize));
+    const Interval near = memo.of(elsewhere_, box.expanded(2 * grid_->voxelSize));
     if (near.isPoint()) return near;
     constexpr float kRounding = 2e-6f;
     const float beyond = kRounding * near.magnitude();
     return {std::max(near.min - beyond, all_.min), std::min(near.max + beyond, all_.max)};
   }
   NodePtr<float> restricted(Restriction& restriction) const override {
-    return constantFrom<float>(range(restriction.box));
+    return constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override { return grid_->voxelSize; }
 

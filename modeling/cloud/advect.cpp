@@ -100,16 +100,16 @@ class TraceBackNode final : public FieldNode<Vec3f> {
     }
   }
 
-  std::array<Interval, 3> range(const Box& box) const override {
+  std::array<Interval, 3> range(const Box& box, RangeMemo& memo) const override {
     Box reached = box;
-    return rangeOf(walked(box, reached));
+    return rangeOf(walked(box, reached, memo));
   }
 
   NodePtr<Vec3f> restricted(Restriction& restriction) const override {
     Box reached = restriction.box;
-    walked(restriction.box, reached);
+    walked(restriction.box, reached, restriction.memo.ranges);
     if (!isBounded(reached)) return nullptr;
-    Restriction there{reached, {}};
+    Restriction there = restriction.elsewhere(reached);
     std::vector<NodePtr<Vec3f>> velocities;
     for (const NodePtr<Vec3f>& velocity : velocities_) velocities.push_back(restrictNode(velocity, there));
     if (velocities == velocities_) return nullptr;
@@ -130,9 +130,8 @@ class TraceBackNode final : public FieldNode<Vec3f> {
   }
 
   std::size_t stepCount() const { return velocities_.size() * std::size_t(repeats_); }
-  const FieldNode<Vec3f>& velocityOf(std::size_t step) const {
-    return *velocities_[step / std::size_t(repeats_)];
-  }
+  const NodePtr<Vec3f>& nodeOf(std::size_t step) const { return velocities_[step / std::size_t(repeats_)]; }
+  const FieldNode<Vec3f>& velocityOf(std::size_t step) const { return *nodeOf(step); }
 
   static Box minus(const Box& box, const std::array<Interval, 3>& u, float dt) {
     auto x = rangeOf(box);
@@ -141,16 +140,16 @@ class TraceBackNode final : public FieldNode<Vec3f> {
   }
 
   /// What contains X of `box`; `reached` grows by every box that the velocity is read in.
-  Box walked(const Box& box, Box& reached) const {
+  Box walked(const Box& box, Box& reached, RangeMemo& memo) const {
     Box here = box;
     for (std::size_t step = stepCount(); step-- > 0 && isBounded(here);) {
-      const FieldNode<Vec3f>& velocity = velocityOf(step);
+      const NodePtr<Vec3f>& velocity = nodeOf(step);
       reached = reached.including(here);
-      auto u = velocity.range(here);
+      auto u = memo.of(velocity, here);
       if (rule_ == TraceRule::midpoint) {
         const Box middle = minus(here, u, 0.5f * dt_);
         reached = reached.including(middle);
-        u = velocity.range(middle);
+        u = memo.of(velocity, middle);
       }
       here = minus(here, u, dt_);
     }

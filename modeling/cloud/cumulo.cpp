@@ -101,12 +101,12 @@ class LayerNode final : public FieldNode<float> {
     for (int i = 0; i < count; ++i) values[0][origin[i]] = noise[i];
   }
 
-  Interval range(const Box& box) const override {
-    const Interval level = level_->range(box);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const Interval level = memo.of(level_, box);
     if (level.max < band_.min || level.min > band_.max) return Interval::of(0);
     if (!amplitudeVaries_ || growsEverywhere_) return {-bound_, bound_};
     const float deepest = std::max(-std::max(level.min, band_.min), std::min(level.max, band_.max));
-    const float most = amplitude_->range(box.expanded(farthest(deepest))).max * noiseBound_;
+    const float most = memo.of(amplitude_, box.expanded(farthest(deepest))).max * noiseBound_;
     return most > 0 ? Interval{-std::min(most, bound_), std::min(most, bound_)} : Interval::of(0);
   }
 

@@ -36,8 +36,8 @@ class RampNode final : public FieldNode<float> {
       for (int axis = 0; axis < 3; ++axis) grads[axis][i] = slope == 0 ? 0.0f : slope * grads[axis][i];
     }
   }
-  Interval range(const Box& box) const override {
-    const Interval f = f_->range(box);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const Interval f = memo.of(f_, box);
     Interval r = Interval::of(at(f.min)).hull(Interval::of(at(f.max)));
     for (const RampStop& stop : stops_)
       if (f.contains(stop.at)) r = r.hull(Interval::of(stop.value));
@@ -45,7 +45,7 @@ class RampNode final : public FieldNode<float> {
     return r;
   }
   NodePtr<float> restricted(Restriction& restriction) const override {
-    const Interval r = range(restriction.box);
+    const Interval r = range(restriction.box, restriction.memo.ranges);
     if (r.isPoint()) return std::make_shared<detail::ConstantNode<float>>(r.min);
     NodePtr<float> f = restrictNode(f_, restriction);
     return f == f_ ? nullptr : std::make_shared<RampNode>(std::move(f), stops_);

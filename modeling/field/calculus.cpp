@@ -33,7 +33,8 @@ class GradNode final : public FieldNode<R> {
     const float reach = std::max({std::abs(restriction.box.min.x), std::abs(restriction.box.min.y),
                                   std::abs(restriction.box.min.z), size.x, size.y, size.z});
     // Two steps: one for this node's differences, one for those of the field; steps grow far from the origin.
-    Restriction wider{restriction.box.expanded(2.5f * std::max(differenceStepOf(*f_), 2e-6f * reach)), {}};
+    Restriction wider = restriction.elsewhere(
+        restriction.box.expanded(2.5f * std::max(differenceStepOf(*f_), 2e-6f * reach)));
     const auto f = restrictNode(f_, wider);
     if (f == f_) return nullptr;
     if (detail::constantOf(f)) return std::make_shared<detail::ConstantNode<R>>(R{});
@@ -80,8 +81,8 @@ class TraceNode final : public FieldNode<R> {
     if (detail::constantOf(j)) return std::make_shared<detail::ConstantNode<R>>(R{});
     return std::make_shared<TraceNode>(table_, j);
   }
-  RangeOf<R> range(const Box& box) const override {
-    const auto j = jacobian_->range(box);
+  RangeOf<R> range(const Box& box, RangeMemo& memo) const override {
+    const auto j = memo.of(jacobian_, box);
     RangeOf<R> result;
     for (int c = 0; c < kLanes; ++c) {
       Interval sum = Interval::of(0.0f);

@@ -62,7 +62,7 @@ class ConstantNode final : public FieldNode<T> {
     eval(points, values, scratch);
     for (float* g : grads) fill(g, 0.0f, points.paddedCount());
   }
-  RangeOf<T> range(const Box&) const override {
+  RangeOf<T> range(const Box&, RangeMemo&) const override {
     RangeOf<T> result;
     for (int c = 0; c < kLanes; ++c) {
       const float v = component(value_, c);

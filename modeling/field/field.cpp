@@ -102,12 +102,13 @@ T Field<T>::operator()(const Vec3f& point) const {
 
 template <class T>
 RangeOf<T> Field<T>::range(const Box& box) const {
-  return node_->range(box);
+  return RangeMemo().of(node_, box);
 }
 
 template <class T>
 Field<T> Field<T>::restrictedTo(const Box& box) const {
-  Restriction restriction{box, {}};
+  RestrictionMemo memo;
+  Restriction restriction{box, memo};
   return Field(restrictNode(node_, restriction));
 }
 

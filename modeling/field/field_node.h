@@ -2,7 +2,6 @@
 
 #include <limits>
 #include <memory>
-#include <unordered_map>
 
 #include "nephele/modeling/base/interval.h"
 #include "nephele/modeling/base/math.h"
@@ -29,10 +28,52 @@ class FieldNode;
 template <class T>
 using NodePtr = std::shared_ptr<const FieldNode<T>>;
 
-/// Keeps shared sub-expressions shared while an expression is restricted to a box.
+/// Ranges of the nodes of an expression, each found once on a box however many others read it: a node asks
+/// for those of its parts here. Belongs to one question and one thread.
+class RangeMemo {
+ public:
+  RangeMemo();
+  ~RangeMemo();
+
+  /// Bounds of all values of `node` on `box`.
+  template <class T>
+  RangeOf<T> of(const NodePtr<T>& node, const Box& box);
+
+ private:
+  struct Tables;
+  std::unique_ptr<Tables> tables_;
+  int asked_ = 0;
+};
+
+/// What is remembered while an expression is restricted, so that shared sub-expressions stay shared and are
+/// looked at once.
+class RestrictionMemo {
+ public:
+  RestrictionMemo();
+  ~RestrictionMemo();
+
+  RangeMemo ranges;
+
+ private:
+  template <class T>
+  friend NodePtr<T> restrictNode(const NodePtr<T>& node, struct Restriction& restriction);
+
+  struct Done;
+  std::unique_ptr<Done> done_;
+};
+
+/// A box that an expression is restricted to.
 struct Restriction {
   Box box;
-  std::unordered_map<const void*, std::shared_ptr<const void>> done;
+  RestrictionMemo& memo;
+
+  /// Of the same expression, to another box: for nodes that read their parts elsewhere.
+  Restriction elsewhere(const Box& other) const { return {other, memo}; }
+  /// The range of `node` on the box.
+  template <class T>
+  RangeOf<T> rangeOf(const NodePtr<T>& node) {
+    return memo.ranges.of(node, box);
+  }
 };
 
 /// One operation of a field expression: immutable, shared between expressions and threads.
@@ -52,8 +93,9 @@ class FieldNode {
   virtual void evalGrad(const PointBlock& points, const BlockLanes<kLanes>& values,
                         const BlockLanes<3 * kLanes>& grads, Scratch& scratch) const;
 
-  /// Bounds that contain every value on `box`. Default: everything.
-  virtual RangeOf<T> range(const Box& box) const;
+  /// Bounds that contain every value on `box`. Default: everything. A node asks `memo` for the ranges of its
+  /// parts, never the parts themselves, so that what is shared is ranged once.
+  virtual RangeOf<T> range(const Box& box, RangeMemo& memo) const;
 
   /// A node equal to this one inside `restriction.box` and cheaper there, or null if there is none. Outside
   /// the box the result may be anything. Default: null. A node that reads its parts beyond the box, as
@@ -73,8 +115,7 @@ float differenceStepOf(const FieldNode<T>& node) {
   return step < kNoLength ? step : kDefaultStep;
 }
 
-/// `node` restricted to `restriction.box`: remembers what was done, and returns `node` itself where nothing
-/// is gained.
+/// `node` restricted to `restriction.box`; `node` itself where nothing is gained.
 template <class T>
 NodePtr<T> restrictNode(const NodePtr<T>& node, Restriction& restriction);
 

@@ -62,7 +62,7 @@ class FunctionNode final : public FieldNode<T> {
       for (int c = 0; c < 3 * kLanes; ++c) grads[c][i] = derivative(g, c);
     }
   }
-  RangeOf<T> range(const Box& box) const override {
+  RangeOf<T> range(const Box& box, RangeMemo&) const override {
     return options_.range ? options_.range(box) : RangeOf<T>{};
   }
   float differenceStep() const override { return options_.differenceStep; }

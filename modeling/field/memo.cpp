@@ -39,7 +39,7 @@ class MemoNode final : public FieldNode<T> {
     float* const rest = keep(points, scratch, true, values);
     for (int c = 0; c < 3 * kLanes; ++c) std::copy_n(grads[c], points.paddedCount(), rest + c * kBlockSize);
   }
-  RangeOf<T> range(const Box& box) const override { return a_->range(box); }
+  RangeOf<T> range(const Box& box, RangeMemo& memo) const override { return memo.of(a_, box); }
   NodePtr<T> restricted(Restriction& restriction) const override {
     const auto a = restrictNode(a_, restriction);
     if (a == a_) return nullptr;

@@ -46,10 +46,12 @@ class UnaryNode final : public FieldNode<float> {
     a_->evalGrad(points, values, grads, scratch);
     detail::applyGrad(op_, p_, values[0], values[0], grads.data(), points.paddedCount());
   }
-  Interval range(const Box& box) const override { return detail::rangeOf(op_, p_, a_->range(box)); }
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    return detail::rangeOf(op_, p_, memo.of(a_, box));
+  }
   NodePtr<float> restricted(Restriction& restriction) const override {
     const NodePtr<float> a = restrictNode(a_, restriction);
-    const Interval r = a->range(restriction.box);
+    const Interval r = restriction.rangeOf(a);
     if (auto constant = constantFrom<float>(detail::rangeOf(op_, p_, r))) return constant;
     if (op_ == Unary::absolute && r.min >= 0) return a;
     if (op_ == Unary::absolute && r.max <= 0) return unary(Unary::negate, {}, a);
@@ -85,12 +87,12 @@ class BinaryNode final : public FieldNode<float> {
     b_->evalGrad(points, {b}, gb, scratch);
     detail::applyGrad(op_, p_, values[0], b, values[0], grads.data(), gb.data(), points.paddedCount());
   }
-  Interval range(const Box& box) const override {
-    return detail::rangeOf(op_, p_, a_->range(box), b_->range(box));
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    return detail::rangeOf(op_, p_, memo.of(a_, box), memo.of(b_, box));
   }
   NodePtr<float> restricted(Restriction& restriction) const override {
     const NodePtr<float> a = restrictNode(a_, restriction), b = restrictNode(b_, restriction);
-    const Interval ra = a->range(restriction.box), rb = b->range(restriction.box);
+    const Interval ra = restriction.rangeOf(a), rb = restriction.rangeOf(b);
     if (auto constant = constantFrom<float>(detail::rangeOf(op_, p_, ra, rb))) return constant;
     if (op_ == Binary::minimum || op_ == Binary::maximum || op_ == Binary::blend) {
       const bool larger = op_ != Binary::minimum;

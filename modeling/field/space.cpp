@@ -29,7 +29,7 @@ class PositionNode final : public FieldNode<Vec3f> {
     eval(points, values, scratch);
     for (int i = 0; i < 9; ++i) detail::fill(grads[i], i % 4 == 0 ? 1.0f : 0.0f, points.paddedCount());
   }
-  std::array<Interval, 3> range(const Box& box) const override { return rangeOf(box); }
+  std::array<Interval, 3> range(const Box& box, RangeMemo&) const override { return rangeOf(box); }
   float differenceStep() const override { return kNoLength; }
 };
 
@@ -67,10 +67,12 @@ class ComposeNode final : public FieldNode<T> {
           detail::product(outer[3 * c + j], jacobian[3 * j + k], 1, j > 0, grads[3 * c + k],
                           points.paddedCount());
   }
-  RangeOf<T> range(const Box& box) const override { return f_->range(boxOf(map_->range(box))); }
+  RangeOf<T> range(const Box& box, RangeMemo& memo) const override {
+    return memo.of(f_, boxOf(memo.of(map_, box)));
+  }
   NodePtr<T> restricted(Restriction& restriction) const override {
     const auto map = restrictNode(map_, restriction);
-    Restriction there{boxOf(map->range(restriction.box)), {}};
+    Restriction there = restriction.elsewhere(boxOf(restriction.rangeOf(map)));
     const auto f = there.box == Box::everywhere() ? f_ : restrictNode(f_, there);
     return f == f_ && map == map_ ? nullptr : composed(f, map);
   }
@@ -119,9 +121,9 @@ class AffineNode final : public FieldNode<T> {
       detail::affine3(transposed_.m.data(), kZero, g, g, points.paddedCount());
     }
   }
-  RangeOf<T> range(const Box& box) const override { return f_->range(mapped(box)); }
+  RangeOf<T> range(const Box& box, RangeMemo& memo) const override { return memo.of(f_, mapped(box)); }
   NodePtr<T> restricted(Restriction& restriction) const override {
-    Restriction there{mapped(restriction.box), {}};
+    Restriction there = restriction.elsewhere(mapped(restriction.box));
     const auto f = restrictNode(f_, there);
     if (f == f_) return nullptr;
     return constantOf(f) ? f : std::make_shared<AffineNode>(f, toField_);

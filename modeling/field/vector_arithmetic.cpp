@@ -55,9 +55,9 @@ class ComponentwiseNode final : public FieldNode<T> {
       detail::applyGrad(op_, {}, values[c], b[other(c)], values[c], grads.data() + 3 * c,
                         gb.data() + 3 * other(c), points.paddedCount());
   }
-  RangeOf<T> range(const Box& box) const override {
-    const RangeOf<T> a = a_->range(box);
-    const RangeOf<B> b = b_->range(box);
+  RangeOf<T> range(const Box& box, RangeMemo& memo) const override {
+    const RangeOf<T> a = memo.of(a_, box);
+    const RangeOf<B> b = memo.of(b_, box);
     RangeOf<T> result;
     for (int c = 0; c < kLanes; ++c)
       rangeComponent(result, c) = detail::rangeOf(op_, {}, rangeComponent(a, c), rangeComponent(b, other(c)));
@@ -68,7 +68,7 @@ class ComponentwiseNode final : public FieldNode<T> {
     const auto b = restrictNode(b_, restriction);
     if (a == a_ && b == b_) return nullptr;
     auto result = componentwise<T, B>(op_, a, b);
-    if (auto constant = constantFrom<T>(result->range(restriction.box))) return constant;
+    if (auto constant = constantFrom<T>(restriction.rangeOf(result))) return constant;
     return result;
   }
   float differenceStep() const override { return std::min(a_->differenceStep(), b_->differenceStep()); }
@@ -158,9 +158,9 @@ class BilinearNode final : public FieldNode<R> {
       before = t.r;
     }
   }
-  RangeOf<R> range(const Box& box) const override {
-    const RangeOf<A> a = a_->range(box);
-    const RangeOf<B> b = b_->range(box);
+  RangeOf<R> range(const Box& box, RangeMemo& memo) const override {
+    const RangeOf<A> a = memo.of(a_, box);
+    const RangeOf<B> b = memo.of(b_, box);
     const bool same = static_cast<const void*>(a_.get()) == static_cast<const void*>(b_.get());
     RangeOf<R> result;
     int before = -1;

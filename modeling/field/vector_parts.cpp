@@ -42,8 +42,8 @@ class PickNode final : public FieldNode<R> {
       for (int k = 0; k < 3; ++k) g[3 * map_[c] + k] = grads[3 * c + k];
     a_->evalGrad(points, target(frame, values), g, scratch);
   }
-  RangeOf<R> range(const Box& box) const override {
-    const RangeOf<A> a = a_->range(box);
+  RangeOf<R> range(const Box& box, RangeMemo& memo) const override {
+    const RangeOf<A> a = memo.of(a_, box);
     RangeOf<R> result;
     for (int c = 0; c < kLanes; ++c) rangeComponent(result, c) = rangeComponent(a, map_[c]);
     return result;
@@ -86,10 +86,10 @@ class JoinNode final : public FieldNode<R> {
     for (int p = 0; p < 3; ++p)
       parts_[p]->evalGrad(points, slice<kPart>(values, p), slice<3 * kPart>(grads, p), scratch);
   }
-  RangeOf<R> range(const Box& box) const override {
+  RangeOf<R> range(const Box& box, RangeMemo& memo) const override {
     RangeOf<R> result;
     for (int p = 0; p < 3; ++p) {
-      const RangeOf<A> part = parts_[p]->range(box);
+      const RangeOf<A> part = memo.of(parts_[p], box);
       for (int c = 0; c < kPart; ++c) rangeComponent(result, p * kPart + c) = rangeComponent(part, c);
     }
     return result;
@@ -163,8 +163,8 @@ class LengthNode final : public FieldNode<float> {
     for (int k = 0; k < 3; ++k)
       for (int c = 0; c < 3; ++c) detail::product(v[c], g[3 * c + k], 1, c > 0, grads[k], n);
   }
-  Interval range(const Box& box) const override {
-    const auto v = v_->range(box);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const auto v = memo.of(v_, box);
     return nephele::sqrt(nephele::square(v[0]) + nephele::square(v[1]) + nephele::square(v[2]));
   }
   NodePtr<float> restricted(Restriction& restriction) const override {
@@ -207,8 +207,8 @@ class NormalizeNode final : public FieldNode<Vec3f> {
       detail::normalize3(column, length, column, n);
     }
   }
-  std::array<Interval, 3> range(const Box& box) const override {
-    const auto v = v_->range(box);
+  std::array<Interval, 3> range(const Box& box, RangeMemo& memo) const override {
+    const auto v = memo.of(v_, box);
     // Lengths that underflow to 0 or overflow give 0 or NaN; only ranges known to be far from both are
     // trusted.
     std::array<Interval, 3> result;

@@ -52,7 +52,7 @@ class LatticeNode final : public FieldNode<float> {
     const float* const xyz[3] = {points.x, points.y, points.z};
     detail::latticeNoiseLanes(noise_, xyz, values[0], grads.data(), points.paddedCount());
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     const Interval bounds{facts_.low, facts_.high};
     const float radius = latticeRadius(box, frequency_, noise_.lattice.offset);
     const float change = facts_.steepest * radius * 1.0001f + 1e-4f;
@@ -81,7 +81,7 @@ class SpectralNode final : public FieldNode<float> {
     const float* const xyz[3] = {points.x, points.y, points.z};
     detail::spectralLanes(tile_, lattice_, xyz, values[0], grads.data(), points.paddedCount());
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     const Interval bounds{tile_.low, tile_.high};
     const float radius = latticeRadius(box, frequency_, lattice_.offset);
     const float change = tile_.steepest * radius * 1.0001f + 1e-4f;
@@ -156,7 +156,7 @@ class CurlNode final : public FieldNode<Vec3f> {
         values[c][i] = scales_[b] * rise[i] - scales_[a] * fall[i];
     }
   }
-  RangeOf<Vec3f> range(const Box&) const override {
+  RangeOf<Vec3f> range(const Box&, RangeMemo&) const override {
     RangeOf<Vec3f> result;
     for (int c = 0; c < 3; ++c) {
       float most = 0;

@@ -51,7 +51,7 @@ class PerlinNode final : public FieldNode<float> {
     const float* const xyz[3] = {points.x, points.y, points.z};
     detail::perlinGradLanes(lattice_, xyz, values[0], grads.data(), points.paddedCount());
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     const Vec3f c = box.center();
     // Rounding of lattice coordinates moves the point that is read, far from the origin by more.
     const float stretch = frequency_ * (1 + kNotOrthogonal);

@@ -49,7 +49,7 @@ class VaryingNoiseNode final : public FieldNode<float> {
     const double octaves = std::log2(double(range.max) / double(range.min));
     perOctave_ = float(double(steps()) / octaves);
     Interval all{0, 0};
-    for (const auto& noise : noises_) all = all.hull(noise->range(Box::everywhere()));
+    for (const auto& noise : noises_) all = all.hull(RangeMemo().of(noise, Box::everywhere()));
     bounds_ = {-cut(-all.min), cut(all.max)};
     for (const auto& noise : noises_) step_ = std::min(step_, noise->differenceStep());
   }
@@ -101,14 +101,14 @@ class VaryingNoiseNode final : public FieldNode<float> {
     }
   }
 
-  Interval range(const Box& box) const override {
-    const Interval frequency = frequency_->range(box);
+  Interval range(const Box& box, RangeMemo& memo) const override {
+    const Interval frequency = memo.of(frequency_, box);
     const float first = stepOf(frequency.min), last = stepOf(frequency.max);
     Interval result = bounds_;
     bool isFirst = true;
     for (int rung = rungOf(first); rung <= rungOf(last); ++rung) {
-      const Interval r = blendRange(rung, noises_[std::size_t(rung)]->range(box),
-                                    noises_[std::size_t(rung) + 1]->range(box), first, last);
+      const Interval r = blendRange(rung, memo.of(noises_[std::size_t(rung)], box),
+                                    memo.of(noises_[std::size_t(rung) + 1], box), first, last);
       result = isFirst ? r : result.hull(r);
       isFirst = false;
     }

@@ -127,7 +127,7 @@ class ShapeNode final : public FieldNode<float> {
                 Scratch&) const override {
     shapeGradLanes(kind_, points, values[0], grads);
   }
-  Interval range(const Box& box) const override {
+  Interval range(const Box& box, RangeMemo&) const override {
     return std::visit(
         [&](const auto& shape) -> Interval {
           const Extent extent = extentOf(shape);

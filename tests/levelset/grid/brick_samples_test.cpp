@@ -86,7 +86,7 @@ class CountingNode final : public FieldNode<float> {
     count += points.count;
     field_->eval(points, values, scratch);
   }
-  Interval range(const Box& box) const override { return field_->range(box); }
+  Interval range(const Box& box, RangeMemo& memo) const override { return memo.of(field_, box); }
   float differenceStep() const override { return field_->differenceStep(); }
   mutable std::atomic<int> count = 0;
 
