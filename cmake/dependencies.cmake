@@ -3,8 +3,8 @@
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(hwy REQUIRED)
-find_path(FFTW3_INCLUDE_DIR fftw3.h REQUIRED)
-find_library(FFTW3F_LIBRARY fftw3f REQUIRED)
+find_path(KISSFFT_INCLUDE_DIR kissfft/kiss_fftr.h REQUIRED)
+find_library(KISSFFT_LIBRARY kissfft-float REQUIRED)
 
 if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
   find_package(Ceres REQUIRED)

@@ -1,9 +1,8 @@
 // A Gaussian random field: independent normal amplitudes for all waves that fit the tile, each as strong as
-// the spectrum asks, turned into values by one inverse FFT (FFTW, single precision: 1e-7 is far below what a
-// spline shows). Waves are divided by what sampling a cubic B-spline does to them, so that the spline takes
-// their values on the nodes. The variance and slope of the spline between the nodes are known for each wave
-// in closed form (sums of shifted sinc powers are B-splines of degree 7 and 5 on whole numbers), which gives
-// exactly unit rms over the tile.
+// the spectrum asks, turned into values by one inverse FFT. Waves are divided by what sampling a cubic
+// B-spline does to them, so that the spline takes their values on the nodes. The variance and slope of the
+// spline between the nodes are known for each wave in closed form (sums of shifted sinc powers are B-splines
+// of degree 7 and 5 on whole numbers), which gives exactly unit rms over the tile.
 //
 // Time: each wave has two amplitudes and goes from one to the other, a cos + b sin, at one of 16 rates:
 // normal with the same variance at all times.
@@ -13,15 +12,11 @@
 // it.
 #include "nephele/modeling/noise/detail/spectral_noise.h"
 
-#include <fftw3.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <memory>
-#include <mutex>
-#include <new>
 
+#include "nephele/modeling/noise/detail/inverse_fft.h"
 #include "nephele/modeling/noise/lattice_noise.h"
 #include "nephele/modeling/noise/noise_draw.h"
 
@@ -29,32 +24,6 @@ namespace nephele::detail {
 namespace {
 
 constexpr double kTurn = 2 * 3.14159265358979323846;
-
-struct FreeFftw {
-  void operator()(void* memory) const { fftwf_free(memory); }
-};
-template <class T>
-using FftwArray = std::unique_ptr<T[], FreeFftw>;
-
-template <class T>
-FftwArray<T> fftwArray(std::size_t count) {
-  FftwArray<T> array(static_cast<T*>(fftwf_malloc(count * sizeof(T))));
-  if (!array) throw std::bad_alloc();
-  std::fill_n(array.get(), count, T{});
-  return array;
-}
-
-using Complex = std::complex<float>;
-
-fftwf_complex* raw(Complex* c) {
-  return reinterpret_cast<fftwf_complex*>(c);
-}
-
-/// Plans share tables inside FFTW; only running them is safe in threads.
-std::mutex& planning() {
-  static std::mutex mutex;
-  return mutex;
-}
 
 /// What belongs to one axis of a wave of `turns` cycles per node.
 struct AxisFactors {
@@ -119,7 +88,7 @@ SpectralTile synthesise(const Spectrum& spectrum, std::uint32_t seed, float time
   tile.resolution = n;
   tile.nodesPerUnit = float(n) / spectrum.tile;
   const NoiseClock clock = noiseClock(time, period);
-  const auto waves = fftwArray<Complex>(std::size_t(n) * n * half);
+  std::vector<std::complex<float>> waves(std::size_t(n) * n * half);
   std::vector<AxisFactors> factors(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) factors[std::size_t(i)] = axisFactors(i, n);
   const double lowest = double(spectrum.lowest) * spectrum.tile,
@@ -140,25 +109,13 @@ SpectralTile synthesise(const Spectrum& spectrum, std::uint32_t seed, float time
         const double strength = std::pow(wave / lowest, -0.5 * double(spectrum.exponent));
         const AxisFactors &fx = factors[index(x)], &fy = factors[index(y)], &fz = factors[index(z)];
         const std::complex<double> c = a * (strength / (fx.sampling * fy.sampling * fz.sampling));
-        waves[(index(z) * std::size_t(n) + index(y)) * std::size_t(half) + index(x)] = Complex(c);
+        waves[(index(z) * std::size_t(n) + index(y)) * std::size_t(half) + index(x)] = std::complex<float>(c);
         const double square = std::norm(c) * (x == 0 ? 1 : 2);
         variance += square * fx.square * fy.square * fz.square;
         slopes += square * (fx.slope * fy.square * fz.square + fx.square * fy.slope * fz.square +
                             fx.square * fy.square * fz.slope);
       }
-  const auto values = fftwArray<float>(std::size_t(n) * n * n);
-  {
-    fftwf_plan plan;
-    {
-      const std::lock_guard lock(planning());
-      // An estimated plan does not depend on timings.
-      plan = fftwf_plan_dft_c2r_3d(n, n, n, raw(waves.get()), values.get(), FFTW_ESTIMATE);
-    }
-    if (!plan) throw std::bad_alloc();
-    fftwf_execute(plan);
-    const std::lock_guard lock(planning());
-    fftwf_destroy_plan(plan);
-  }
+  const std::vector<float> values = sumOfWaves(waves, n);
   const float scale = float(1 / std::sqrt(variance));
   tile.gradientRms = float(std::sqrt(slopes / variance / 3) * n / double(spectrum.tile));
   const int row = tile.rowLength();

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/noise/detail/inverse_fft.h"
 #include "nephele/modeling/noise/noise.h"
 #include "tests/modeling/noise/noise_statistics.h"
 #include "tests/support/check_field.h"
@@ -19,6 +20,45 @@ using test::smallSpectrum;
 
 /// Lattice coordinates that are world coordinates.
 const detail::PerlinLattice kStraight{Mat3f::identity(), {}, 0};
+
+TEST(InverseFft, SumsWavesAsTheFormulaSays) {
+  // Each wave is 2 |w| cos(2 pi (a x + b y + c z) / n + arg w), with its opposite; alone where it is its own.
+  struct Wave {
+    int a, b, c;
+    std::complex<double> w;
+  };
+  for (const int n : {16, 32, 64, 128}) {
+    const Wave all[] = {{0, 0, 0, {0.7, 0}},       {1, 0, 0, {0.3, -0.4}},
+                        {3, 2, -5, {-1, 0.5}},     {n / 2 - 1, -1, 4, {0.2, 0.9}},
+                        {0, 5, -3, {0.6, -0.1}},   {0, 0, 7, {0, 1}},
+                        {n / 4, -n / 4, 2, {1, 1}}};
+    const int half = n / 2 + 1;
+    std::vector<std::complex<float>> waves(std::size_t(n) * n * half);
+    const auto place = [&](int a, int b, int c) -> std::complex<float>& {
+      return waves[(std::size_t(c & (n - 1)) * n + std::size_t(b & (n - 1))) * std::size_t(half) +
+                   std::size_t(a)];
+    };
+    for (const Wave& wave : all) {
+      place(wave.a, wave.b, wave.c) = std::complex<float>(wave.w);
+      if (wave.a == 0) place(0, -wave.b, -wave.c) = std::conj(std::complex<float>(wave.w));
+    }
+    const std::vector<float> values = detail::sumOfWaves(waves, n);
+    ASSERT_EQ(values.size(), std::size_t(n) * n * n);
+    std::mt19937 random(3);
+    for (int i = 0; i < 2000; ++i) {
+      const int x = int(random() % unsigned(n)), y = int(random() % unsigned(n)),
+                z = int(random() % unsigned(n));
+      double expected = 0;
+      for (const Wave& wave : all) {
+        const double turns = double(wave.a) * x + double(wave.b) * y + double(wave.c) * z;
+        const double own = (wave.w * std::polar(1.0, 2 * std::numbers::pi * turns / n)).real();
+        expected += wave.a == 0 && wave.b == 0 && wave.c == 0 ? own : 2 * own;
+      }
+      // Of the order of log2(n^3) roundings of 6e-8 of sums up to 12.
+      EXPECT_NEAR(values[(std::size_t(z) * n + y) * n + x], expected, 1e-5) << n;
+    }
+  }
+}
 
 TEST(SpectralNoise, LanesEqualTheScalarTruthBitForBit) {
   const detail::SpectralTile tile = detail::synthesise({3, 0.5f, 2, 4, 32}, 5, 0, 0);
