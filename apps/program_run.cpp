@@ -1,17 +1,16 @@
 #include "apps/program_run.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <fstream>
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/system.h"
 
 namespace nephele::apps {
 namespace {
@@ -27,30 +26,6 @@ extern "C" void onStopSignal(int signal) {
     _exit(128 + signal);
   }
   receivedSignal = signal;
-}
-
-double physicalMemory() {
-  return double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-}
-
-// What the process may use: the machine's memory, or less where a control group or a resource limit says so.
-double allowedMemory() {
-  double bytes = physicalMemory();
-  for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
-    std::ifstream file(path);
-    double limit = 0;
-    if (file >> limit && limit > 0) bytes = std::min(bytes, limit);
-  }
-  rlimit limit{};
-  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
-    bytes = std::min(bytes, double(limit.rlim_cur));
-  return bytes;
-}
-
-double peakMemory() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return double(usage.ru_maxrss) * 1024;
 }
 
 std::string inUnits(double bytes) {

@@ -28,22 +28,18 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 }
 
 // The part that one frame has in the progress of all.
-class FrameProgress : public Progress {
+class FrameProgress : public SubProgress {
  public:
   FrameProgress(const Progress& whole, std::size_t done, std::size_t count)
-      : whole_(whole), done_(done), count_(count) {}
+      : SubProgress(whole, double(done) / double(count), double(done + 1) / double(count)) {}
 
   // Light takes a small part of a frame, where it is made for each at all.
   void begin(std::string_view stage) const override { isPicture_ = stage == "march" || stage == "trace"; }
   void advance(double fraction) const override {
-    if (isPicture_) whole_.advance((double(done_) + fraction) / double(count_));
+    if (isPicture_) SubProgress::advance(fraction);
   }
-  void note(std::string_view message) const override { whole_.note(message); }
-  bool cancelled() const override { return whole_.cancelled(); }
 
  private:
-  const Progress& whole_;
-  std::size_t done_, count_;
   mutable std::atomic<bool> isPicture_{false};
 };
 

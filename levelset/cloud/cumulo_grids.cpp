@@ -286,20 +286,6 @@ BrickSamples windowOf(const std::deque<Part>& parts, const Slab& slab, const Box
   return window;
 }
 
-/// Work that is a part of a stage: from one share of it to another.
-class ShareOfProgress final : public Progress {
- public:
-  ShareOfProgress(const Progress& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
-
-  void advance(double fraction) const override { whole_.advance(from_ + (to_ - from_) * fraction); }
-  void note(std::string_view message) const override { whole_.note(message); }
-  bool cancelled() const override { return whole_.cancelled(); }
-
- private:
-  const Progress& whole_;
-  double from_, to_;
-};
-
 class LayerSampler {
  public:
   LayerSampler(const std::vector<CumuloLayer>& layers, const CumuloGridOptions& options,
@@ -340,7 +326,7 @@ class LayerSampler {
     const int count = cut.count();
     std::deque<Part> parts;
     const auto bakePart = [&](int part) {
-      const ShareOfProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
+      const SubProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
       parts.push_back({cut[part], bakeSlab(needed, cut[part], box, voxel, share)});
     };
     // The only part, or a part with what is around it.
@@ -360,8 +346,7 @@ class LayerSampler {
       detail::releaseFreed();
       const double done = kShareOfBake * std::min(part + 2, count) / count;
       MedialSmoothing smooth{0, std::vector<bool>(window.pool.size())};
-      if (step.bound > 0)
-        smooth = smoothMedialJumps(window, smoothing, ShareOfProgress(progress_, done, done));
+      if (step.bound > 0) smooth = smoothMedialJumps(window, smoothing, SubProgress(progress_, done, done));
       std::vector<Packing> packing = judged(step, window, cut[part], total);
       for (std::size_t b = 0; b < packing.size(); ++b)
         if (packing[b] == Packing::whole && smooth.signless[b]) packing[b] = Packing::absolute;
@@ -417,7 +402,7 @@ class LayerSampler {
     // At the grid's own voxels trilinear interpolation gives the samples.
     level_ = detail::packed(detail::bakeSamples(
         ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))), spec,
-        ShareOfProgress(progress_, kShareOfBake, 1)));
+        SubProgress(progress_, kShareOfBake, 1)));
     sampled.level = gridField(level_);
     sampled.surface = gridField(level_, Interpolation::tricubic);
   }

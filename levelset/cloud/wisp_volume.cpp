@@ -8,33 +8,26 @@ namespace {
 
 /// Dots that are grown at a time.
 constexpr std::size_t kPart = std::size_t(1) << 21;
-
-/// Passes on only that the work was cancelled.
-class CancelOnly final : public Progress {
- public:
-  explicit CancelOnly(const Progress& whole) : whole_(whole) {}
-  bool cancelled() const override { return whole_.cancelled(); }
-
- private:
-  const Progress& whole_;
-};
+/// Of the time that a part takes.
+constexpr double kGrowing = 0.5;
 
 }  // namespace
 
 DotVolume bakeWisps(std::span<const WispGuide> guides, const WispVolumeOptions& options,
                     const Progress& progress) {
   DotVolume volume(options.dots);
-  const CancelOnly inner(progress);
   const std::size_t part = std::max<std::size_t>(1, kPart / std::max(1u, options.wisps.dots));
   for (std::size_t first = 0; first < guides.size(); first += part) {
     WispOptions wisps = options.wisps;
     wisps.firstGuide += first;
     const std::size_t count = std::min(part, guides.size() - first);
-    Dots dots = growWisps(guides.subspan(first, count), wisps, inner);
+    const double from = double(first) / double(guides.size()),
+                 to = double(first + count) / double(guides.size());
+    const double grown = from + kGrowing * (to - from);
+    Dots dots = growWisps(guides.subspan(first, count), wisps, SubProgress(progress, from, grown));
     if (options.velocity) addVelocity(dots, *options.velocity);
-    volume.add(dots, inner);
+    volume.add(dots, SubProgress(progress, grown, to));
     if (options.also) options.also(dots);
-    progress.advance(double(first + count) / double(guides.size()));
   }
   return volume;
 }

@@ -36,18 +36,6 @@ using Samples = std::array<float, kOwnSamples>;
 /// background: blurred rims would spread by a voxel in every step.
 constexpr float kNothing = 1e-6f;
 
-/// A share of the progress of a longer work.
-class PartOf final : public Progress {
- public:
-  PartOf(const Progress& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
-  void advance(double fraction) const override { whole_.advance(from_ + (to_ - from_) * fraction); }
-  bool cancelled() const override { return whole_.cancelled(); }
-
- private:
-  const Progress& whole_;
-  double from_, to_;
-};
-
 void evaluate(const VectorField& field, const BrickPoints& at, BrickPoints& result) {
   Spans<3> spans;
   spans.lanes = {std::span<float>(result.x), std::span<float>(result.y), std::span<float>(result.z)};
@@ -173,7 +161,7 @@ class GridStep {
   GridHandle plain(const Progress& progress) const { return moved(source_, source_, progress); }
 
   GridHandle macCormack(const Progress& progress) const {
-    const PartOf first(progress, 0, 0.4), second(progress, 0.4, 1);
+    const SubProgress first(progress, 0, 0.4), second(progress, 0.4, 1);
     const Source ahead(plain(first), Interpolation::trilinear);
     const auto fill = [&](const Vec3i& brick, float* samples) {
       const BrickPoints points(lattice_, brick);
@@ -194,7 +182,7 @@ class GridStep {
   }
 
   GridHandle bfecc(const Progress& progress) const {
-    const PartOf first(progress, 0, 0.3), second(progress, 0.3, 0.7), third(progress, 0.7, 1);
+    const SubProgress first(progress, 0, 0.3), second(progress, 0.3, 0.7), third(progress, 0.7, 1);
     const Source ahead(plain(first), Interpolation::trilinear);
     const auto fill = [&](const Vec3i& brick, float* samples) {
       const BrickPoints points(lattice_, brick);
@@ -267,7 +255,8 @@ void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const 
   };
   for (int step = 0; step < options.steps; ++step) {
     const auto start = std::chrono::steady_clock::now();
-    const PartOf part(progress, double(step) / (options.steps + 1), double(step + 1) / (options.steps + 1));
+    const SubProgress part(progress, double(step) / (options.steps + 1),
+                           double(step + 1) / (options.steps + 1));
     map = advanced(map, *matter, velocity(step), options.dt, part);
     AdvectionStep report{.bricks = map.bricks.size(), .memoryBytes = map.memoryBytes()};
     report.foldedShare = foldedShare(map, *matter);
@@ -280,7 +269,7 @@ void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const 
     report.seconds = secondsSince(start);
     result.steps.push_back(report);
   }
-  bake(PartOf(progress, double(options.steps) / (options.steps + 1), 1));
+  bake(SubProgress(progress, double(options.steps) / (options.steps + 1), 1));
   result.map = std::move(map);
 }
 
@@ -293,8 +282,8 @@ void advectGridless(AdvectedGrids& result, const VelocityOfStep& velocity, const
   const VectorField forward = traceBack(velocities, {.dt = -options.dt});
   const float longest = kLongestStep * float(std::max(options.steps, 1));
   for (std::size_t i = 0; i < result.grids.size(); ++i) {
-    const PartOf part(progress, double(i) / double(result.grids.size()),
-                      double(i + 1) / double(result.grids.size()));
+    const SubProgress part(progress, double(i) / double(result.grids.size()),
+                           double(i + 1) / double(result.grids.size()));
     const VectorField* before = nullptr;
     for (const VectorField& u : velocities) {
       if (!before || before->node() != u.node())
@@ -317,7 +306,7 @@ void advectOnGrids(AdvectedGrids& result, const VelocityOfStep& velocity, const 
     const VectorField u = velocity(step);
     AdvectionStep report;
     for (GridHandle& grid : result.grids) {
-      const PartOf part(progress, done / parts, (done + 1) / parts);
+      const SubProgress part(progress, done / parts, (done + 1) / parts);
       const GridStep one(grid, u, options.dt);
       grid = options.scheme == GridScheme::plain        ? one.plain(part)
              : options.scheme == GridScheme::macCormack ? one.macCormack(part)

@@ -239,8 +239,7 @@ FlowMap readFlowMap(const std::string& path) {
     std::sort(map.bricks.begin(), map.bricks.end(), comesBefore);
     return map;
   }
-  throw Error(fmt::format("{}: no map of a flow (grid '{}', as 'nephele advect --map' writes it); {}", path,
-                          kMapGrid, listOf(grids)));
+  throw Error(fmt::format("{}: no map of a flow, which has a grid '{}'; {}", path, kMapGrid, listOf(grids)));
 }
 
 VectorField readVelocity(const std::string& path, const std::string& name) {

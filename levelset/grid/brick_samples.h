@@ -1,16 +1,14 @@
 #pragma once
 
-#include <sys/mman.h>
-
 #include <cstdint>
 #include <memory>
-#include <new>
 #include <utility>
 #include <vector>
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/modeling/base/system.h"
 
 /// Sparse grids while they are made: bricks without the borders that interpolation reads. For the
 /// implementation of bakes.
@@ -22,9 +20,7 @@ class SampleStore {
   SampleStore() = default;
   explicit SampleStore(std::size_t count) : bytes_(count * sizeof(float)) {
     if (count == 0) return;
-    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (memory == MAP_FAILED) throw std::bad_alloc();
-    data_ = static_cast<float*>(memory);
+    data_ = static_cast<float*>(newPages(bytes_));
   }
   SampleStore(SampleStore&& other) noexcept { swap(other); }
   SampleStore& operator=(SampleStore&& other) noexcept {
@@ -33,7 +29,7 @@ class SampleStore {
     return *this;
   }
   ~SampleStore() {
-    if (data_) munmap(data_, bytes_);
+    if (data_) freePages(data_, bytes_);
   }
 
   float* data() const { return data_; }

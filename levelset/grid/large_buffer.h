@@ -1,21 +1,15 @@
 #pragma once
 
-#include <malloc.h>
-#include <sys/mman.h>
-
-#include <cstdint>
 #include <vector>
+
+#include "nephele/modeling/base/system.h"
 
 namespace nephele::detail {
 
 /// Asks for huge pages where values have not been touched yet: first touch then costs a fifth.
 template <class T>
 void useHugePages(T* first, T* last) {
-  constexpr std::uintptr_t kHugePage = std::uintptr_t(1) << 21;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(first) + kHugePage - 1) & ~(kHugePage - 1);
-  const auto end = reinterpret_cast<std::uintptr_t>(last) & ~(kHugePage - 1);
-  // A hint: where the system refuses, ordinary pages do.
-  if (begin < end) static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+  adviseHugePages(first, last);
 }
 
 /// Makes room in a large vector of plain values, on huge pages where the system offers them.
@@ -35,16 +29,13 @@ void resizeLarge(std::vector<T>& values, std::size_t count) {
 /// Gives the whole pages of values that are no longer needed back to the system; they read as 0 from then on.
 template <class T>
 void releasePages(T* first, T* last) {
-  constexpr std::uintptr_t kPage = 4096;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(first) + kPage - 1) & ~(kPage - 1);
-  const auto end = reinterpret_cast<std::uintptr_t>(last) & ~(kPage - 1);
-  if (begin < end) static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED));
+  dropPages(first, last);
 }
 
 /// Gives back what the allocator keeps of memory that was freed: after a stage with many small parts, before
 /// one with few large ones.
 inline void releaseFreed() {
-  malloc_trim(0);
+  trimAllocator();
 }
 
 }  // namespace nephele::detail

@@ -1,10 +1,10 @@
 // Large arrays begin on a huge page, so that first touch costs a fifth of what it does on small ones.
 #include "nephele/levelset/grid/memory_chunks.h"
 
-#include <sys/mman.h>
-
 #include <cstdlib>
 #include <new>
+
+#include "nephele/modeling/base/system.h"
 
 namespace nephele::detail {
 
@@ -16,8 +16,7 @@ LargeArray::LargeArray(std::size_t count) {
   const std::size_t whole = (bytes + alignment - 1) / alignment * alignment;
   void* memory = std::aligned_alloc(alignment, whole);
   if (!memory) throw std::bad_alloc();
-  // A hint: where the system refuses, ordinary pages do.
-  if (alignment == kHugePage) static_cast<void>(madvise(memory, whole, MADV_HUGEPAGE));
+  if (alignment == kHugePage) adviseHugePages(memory, static_cast<char*>(memory) + whole);
   values_.reset(static_cast<float*>(memory));
 }
 

@@ -38,6 +38,22 @@ class Progress {
   }
 };
 
+/// A part of the current stage of longer work: what it advances takes the stage from the share `from` to
+/// `to`. Its own stages and counts are not told; notes and cancelling go through.
+class SubProgress : public Progress {
+ public:
+  /// `whole` must outlive this. 0 <= from <= to <= 1.
+  SubProgress(const Progress& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
+
+  void advance(double fraction) const override { whole_.advance(from_ + (to_ - from_) * fraction); }
+  void note(std::string_view message) const override { whole_.note(message); }
+  bool cancelled() const override { return whole_.cancelled(); }
+
+ private:
+  const Progress& whole_;
+  double from_, to_;
+};
+
 /// A Progress that reports nothing, for default arguments.
 inline const Progress& silent() {
   static const Progress progress;

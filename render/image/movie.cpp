@@ -8,7 +8,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
-#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -22,6 +21,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/system.h"
 
 extern char** environ;
 
@@ -95,7 +95,7 @@ MovieWriter::MovieWriter(const std::string& path, int width, int height, const O
           fmt::format("{}: no way to send ffmpeg its frames", path));
   reading.number = ends[0];
   process_->input.number = ends[1];
-  process_->messages.number = ::memfd_create("messages of ffmpeg", MFD_CLOEXEC);
+  process_->messages.number = memoryFile("messages of ffmpeg");
   require(process_->messages.number >= 0, fmt::format("{}: no place for ffmpeg's messages", path));
 
   posix_spawn_file_actions_t actions;
