@@ -13,13 +13,6 @@
 namespace nephele {
 namespace {
 
-using detail::AlignmentFrame;
-using detail::ExactLook;
-using detail::kStartPoints;
-using detail::Look;
-using detail::LookSample;
-using detail::Softened;
-
 constexpr int kPerAxis = 5, kControls = kPerAxis * kPerAxis * kPerAxis;
 
 /// The 64 control points that have a say at a point, and their weights.
@@ -76,7 +69,7 @@ struct LatticePoint {
 /// Object points in the reference, reference points on planes, second differences of control points.
 class LatticeCost final : public ceres::CostFunction {
  public:
-  LatticeCost(const Look& reference, std::vector<LatticePoint> points, std::vector<PlanePoint> planes,
+  LatticeCost(const detail::Look& reference, std::vector<LatticePoint> points, std::vector<PlanePoint> planes,
               double smoothness)
       : reference_(reference),
         points_(std::move(points)),
@@ -101,12 +94,13 @@ class LatticeCost final : public ceres::CostFunction {
       row += 3 * kControls;
     };
     constexpr double kWidth = 0.05;
-    const Softened soften{kWidth};
+    const detail::Softened soften{kWidth};
     double slope = 0;
     const double perPoint = 1 / std::sqrt(double(points_.size()));
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const LatticePoint& point = points_[i];
-      const LookSample l = reference_.at(point.from + displacementOf(point.stencil, control), cursors_[i]);
+      const detail::LookSample l =
+          reference_.at(point.from + displacementOf(point.stencil, control), cursors_[i]);
       *residuals++ = perPoint * soften(l.value, slope);
       addRow(point.stencil, l.gradient * (slope * perPoint));
     }
@@ -150,7 +144,7 @@ class LatticeCost final : public ceres::CostFunction {
     }
   }
 
-  const Look& reference_;
+  const detail::Look& reference_;
   std::vector<LatticePoint> points_;
   std::vector<PlanePoint> planes_;
   mutable std::vector<ExactDistance::Cursor> cursors_;
@@ -170,12 +164,13 @@ Vec3d BendLattice::operator()(const Vec3d& p) const {
 BendLattice alignLattice(const ExactDistance& reference, const ExactDistance& object,
                          const Similarity& similarity, const LatticeOptions& options,
                          const Progress& progress) {
-  require(options.pointCount >= kStartPoints,
-          fmt::format("alignment: pointCount must be at least {}, got {}", kStartPoints, options.pointCount));
+  require(options.pointCount >= detail::kStartPoints,
+          fmt::format("alignment: pointCount must be at least {}, got {}", detail::kStartPoints,
+                      options.pointCount));
   require(options.smoothness > 0 && std::isfinite(options.smoothness),
           fmt::format("alignment: smoothness must be > 0, got {}", options.smoothness));
-  const AlignmentFrame source(object), target(reference);
-  const ExactLook look(reference);
+  const detail::AlignmentFrame source(object), target(reference);
+  const detail::ExactLook look(reference);
   const auto aligned = [&](const Vec3d& p) { return target.toLocal(similarity(p)); };
   // The box of the whole aligned object, in the frame of the reference.
   Vec3d low(1e30, 1e30, 1e30), high = -low;

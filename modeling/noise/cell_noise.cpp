@@ -239,15 +239,7 @@ HWY_EXPORT(cellNoiseKernel);
 }  // namespace
 
 float cellNoiseScalar(const LatticeNoise& noise, const Vec3f& point, Vec3f* gradient) {
-  const float* const xyz[3] = {&point.x, &point.y, &point.z};
-  float value = 0;
-  if (!gradient) {
-    HWY_NAMESPACE::evaluateCell<float>(noise, xyz, &value, nullptr, 1);
-    return value;
-  }
-  float* const grads[3] = {&gradient->x, &gradient->y, &gradient->z};
-  HWY_NAMESPACE::evaluateCell<float>(noise, xyz, &value, grads, 1);
-  return value;
+  return HWY_NAMESPACE::evaluateOne(HWY_NAMESPACE::evaluateCell<float>, noise, point, gradient);
 }
 
 void cellNoiseLanes(const LatticeNoise& noise, const float* const points[3], float* values,

@@ -25,18 +25,6 @@
 
 #include "nephele/modeling/noise/detail/noise_loop.h"
 
-#ifndef NEPHELE_LATTICE_CONSTANTS
-#define NEPHELE_LATTICE_CONSTANTS
-namespace nephele::detail {
-namespace {
-
-// Thirds of the signed 32-bit range: below the first gradients lie in xy, below the second in xz, else in yz.
-constexpr std::int32_t kThird = -715827883, kTwoThirds = 715827882;
-
-}  // namespace
-}  // namespace nephele::detail
-#endif
-
 HWY_BEFORE_NAMESPACE();
 namespace nephele::detail {
 namespace HWY_NAMESPACE {
@@ -279,15 +267,7 @@ NoiseClock noiseClock(float time, float period) {
 
 float latticeNoiseScalar(const LatticeNoise& noise, const Vec3f& point, Vec3f* gradient) {
   if (isCellNoise(noise.kind)) return cellNoiseScalar(noise, point, gradient);
-  const float* const xyz[3] = {&point.x, &point.y, &point.z};
-  float value = 0;
-  if (!gradient) {
-    HWY_NAMESPACE::evaluateLattice<float>(noise, xyz, &value, nullptr, 1);
-    return value;
-  }
-  float* const grads[3] = {&gradient->x, &gradient->y, &gradient->z};
-  HWY_NAMESPACE::evaluateLattice<float>(noise, xyz, &value, grads, 1);
-  return value;
+  return HWY_NAMESPACE::evaluateOne(HWY_NAMESPACE::evaluateLattice<float>, noise, point, gradient);
 }
 
 void latticeNoiseLanes(const LatticeNoise& noise, const float* const points[3], float* values,

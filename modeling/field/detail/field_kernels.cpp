@@ -18,18 +18,11 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include "nephele/modeling/field/detail/field_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace nephele::detail {
 namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-// At most 16 floats, so that a multiple of 16 needs no tail.
-using D = hn::CappedTag<float, 16>;
-using V = hn::Vec<D>;
-
-HWY_INLINE V constant(float v) {
-  return hn::Set(D(), v);
-}
 // Not Ne(a, a), which is false for NaN on some instruction sets.
 HWY_INLINE auto isNaN(V a) {
   return hn::Not(hn::Eq(a, a));

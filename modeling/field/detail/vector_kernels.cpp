@@ -10,18 +10,11 @@
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>
 
+#include "nephele/modeling/field/detail/field_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace nephele::detail {
 namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-// At most 16 floats, so that a multiple of 16 needs no tail.
-using D = hn::CappedTag<float, 16>;
-using V = hn::Vec<D>;
-
-HWY_INLINE V constant(float v) {
-  return hn::Set(D(), v);
-}
 
 void productLanes(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
   const D d;

@@ -13,10 +13,12 @@
 #define NEPHELE_NOISE_HASH
 namespace nephele::detail {
 
-// Odd multipliers with well spread bits. Those of corners are the ones of noise_kernels.cpp.
+// Odd multipliers with well spread bits.
 inline constexpr std::uint32_t kX = 0x9e3779b1u, kY = 0x85ebca77u, kZ = 0xc2b2ae3du;
 inline constexpr std::uint32_t kMixRow = 0x7feb352du, kMixCorner = 0x846ca68bu;
 inline constexpr std::uint32_t kSecond = 0xadb4a92du, kThirdNumber = 0xd1342543u, kAgain = 0x2c1b3c6du;
+// Thirds of the signed 32-bit range: below the first gradients lie in xy, below the second in xz, else in yz.
+inline constexpr std::int32_t kThird = -715827883, kTwoThirds = 715827882;
 /// Cells are whole floats up to here, and fit an int.
 inline constexpr float kFarthest = 1e9f;
 

@@ -19,18 +19,13 @@
 // After foreach_target.h, as it decides what it defines.
 #include <hwy/highway.h>
 
+#include "nephele/modeling/noise/detail/noise_cells.h"
+
 #ifndef NEPHELE_NOISE_CONSTANTS
 #define NEPHELE_NOISE_CONSTANTS
 namespace nephele::detail {
 namespace {
 
-// Odd multipliers with well spread bits.
-constexpr std::uint32_t kX = 0x9e3779b1u, kY = 0x85ebca77u, kZ = 0xc2b2ae3du;
-constexpr std::uint32_t kMixRow = 0x7feb352du, kMixCorner = 0x846ca68bu;
-// Thirds of the signed 32-bit range: below the first gradients lie in xy, below the second in xz, else in yz.
-constexpr std::int32_t kThird = -715827883, kTwoThirds = 715827882;
-// Cells are whole floats up to here, and fit an int.
-constexpr float kFarthest = 1e9f;
 constexpr float kInverseRms = 1 / kPerlinRms;
 
 }  // namespace
@@ -40,10 +35,7 @@ constexpr float kInverseRms = 1 / kPerlinRms;
 HWY_BEFORE_NAMESPACE();
 namespace nephele::detail {
 namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-// At most 16 floats, so that a multiple of 16 needs no tail.
-using D = hn::CappedTag<float, 16>;
+using D = LanesTag;
 using V = hn::Vec<D>;
 using DI = hn::RebindToSigned<D>;
 using VI = hn::Vec<DI>;

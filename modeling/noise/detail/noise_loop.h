@@ -78,6 +78,20 @@ void evaluateKind(const LatticeNoise& noise, const float* const points[3], float
   }
 }
 
+/// One point by `evaluate`, a loop over plain floats: the truth.
+template <class Evaluate>
+float evaluateOne(const Evaluate& evaluate, const LatticeNoise& noise, const Vec3f& point, Vec3f* gradient) {
+  const float* const xyz[3] = {&point.x, &point.y, &point.z};
+  float value = 0;
+  if (!gradient) {
+    evaluate(noise, xyz, &value, nullptr, 1);
+    return value;
+  }
+  float* const grads[3] = {&gradient->x, &gradient->y, &gradient->z};
+  evaluate(noise, xyz, &value, grads, 1);
+  return value;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace nephele::detail
 HWY_AFTER_NAMESPACE();
