@@ -2,6 +2,8 @@
 // expression is deeper than any before; after that, taking a lane is an index and a pointer.
 #include "nephele/modeling/field/scratch.h"
 
+#include "nephele/modeling/base/assertion.h"
+
 namespace nephele {
 namespace {
 
@@ -35,6 +37,7 @@ float* Scratch::take() {
 }
 
 PointBlock Scratch::pointBlock(const BlockLanes<3>& xyz, int count) {
+  NEPHELE_ASSERT(count >= 0 && count <= kBlockSize);
   const PointBlock block{xyz[0], xyz[1], xyz[2], count, ++storage_->lastId};
   for (float* lane : xyz)
     for (int i = count; i < block.paddedCount(); ++i) lane[i] = lane[count - 1];
@@ -42,6 +45,7 @@ PointBlock Scratch::pointBlock(const BlockLanes<3>& xyz, int count) {
 }
 
 Scratch::MemoEntry& Scratch::memoEntry(std::uint64_t nodeSerial) {
+  NEPHELE_ASSERT(nodeSerial > 0);
   return storage_->memo[nodeSerial % kMemoEntries];
 }
 

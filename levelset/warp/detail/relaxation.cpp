@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "nephele/modeling/base/assertion.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
@@ -118,6 +119,7 @@ Relaxation::Relaxation(const ExactDistance& reference, const SmoothNormals& norm
 }
 
 void Relaxation::relax(std::span<Vec3d> images, const RelaxationOptions& options, const Progress& progress) {
+  NEPHELE_ASSERT(images.size() == indexOf_.size());
   place(images);
   run(options, progress);
   for (std::size_t v = 0; v < images.size(); ++v)

@@ -6,6 +6,7 @@
 
 #include "nephele/levelset/warp/detail/one_thread.h"
 #include "nephele/levelset/warp/detail/relaxation.h"
+#include "nephele/modeling/base/assertion.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
@@ -60,6 +61,7 @@ void Relaxation::buildPattern() {
 }
 
 void Relaxation::assemble(const RelaxationEnergy& energy) {
+  NEPHELE_ASSERT(place_.size() == 21 * triangles_.size());
   std::vector<std::array<double, 27>> local(triangles_.size());
   parallelFor(triangles_.size(), kRelaxationGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) localTerms(triangles_[k], energy, local[k]);

@@ -10,6 +10,9 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+
+#include "nephele/modeling/base/assertion.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nephele/modeling/field/detail/field_kernels.cpp"
@@ -312,6 +315,11 @@ bool isPlainLoop(Binary op) {
   return op == Binary::power || op == Binary::arcTangent2;
 }
 
+/// What lane kernels rely on.
+[[maybe_unused]] bool isWholeLanes(const float* lanes, int count) {
+  return count >= 0 && count % 16 == 0 && reinterpret_cast<std::uintptr_t>(lanes) % 64 == 0;
+}
+
 /// Derivative of the operations that are plain loops; `v` is their value.
 float derivative(Unary op, float a, float v) {
   switch (op) {
@@ -329,6 +337,7 @@ float derivative(Unary op, float a, float v) {
 }  // namespace
 
 void apply(Unary op, Parameters parameters, const float* a, float* out, int count) {
+  NEPHELE_ASSERT(isWholeLanes(out, count));
   if (!isPlainLoop(op)) {
     HWY_DYNAMIC_DISPATCH(unaryLanes)(op, parameters, a, out, count);
     return;
@@ -337,6 +346,7 @@ void apply(Unary op, Parameters parameters, const float* a, float* out, int coun
 }
 
 void applyGrad(Unary op, Parameters parameters, const float* a, float* out, float* const g[3], int count) {
+  NEPHELE_ASSERT(isWholeLanes(out, count));
   if (!isPlainLoop(op)) {
     HWY_DYNAMIC_DISPATCH(unaryGradLanes)(op, parameters, a, out, g, count);
     return;
@@ -350,6 +360,7 @@ void applyGrad(Unary op, Parameters parameters, const float* a, float* out, floa
 }
 
 void apply(Binary op, Parameters parameters, const float* a, const float* b, float* out, int count) {
+  NEPHELE_ASSERT(isWholeLanes(out, count));
   if (!isPlainLoop(op)) {
     HWY_DYNAMIC_DISPATCH(binaryLanes)(op, parameters, a, b, out, count);
     return;
@@ -359,6 +370,7 @@ void apply(Binary op, Parameters parameters, const float* a, const float* b, flo
 
 void applyGrad(Binary op, Parameters parameters, const float* a, const float* b, float* out,
                float* const ga[3], const float* const gb[3], int count) {
+  NEPHELE_ASSERT(isWholeLanes(out, count));
   if (!isPlainLoop(op)) {
     HWY_DYNAMIC_DISPATCH(binaryGradLanes)(op, parameters, a, b, out, ga, gb, count);
     return;
