@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/cloud/layers_on_grids.h"
 #include "nephele/levelset/io/vdb_io.h"
 
 namespace nephele {

@@ -9,7 +9,7 @@
 // Source: Tessendorf, Resolution Independent Volumes, 3.3 and 3.4. The valley factor reads the displacement
 // that the layer before left at y, the surface it made; its noise evaluated at y would clear other places
 // than its valleys. Limits: where the medial axis outside the shape is nearer than the reach of the layers, y
-// jumps, and so does the result; the bake in levelset/cloud/cumulo_grids.cpp smooths that, the procedural
+// jumps, and so does the result; the bake in levelset/cloud/layers_on_grids.cpp smooths that, the procedural
 // form does not.
 #include "nephele/modeling/cloud/cumulo.h"
 

@@ -52,7 +52,7 @@ struct CumuloOptions {
   float voxelSize = 0.0f;
   /// Newton steps towards the surface, 1 to 64.
   int newtonSteps = 5;
-  /// Replaces each layer by a sampled one; see levelset/cloud/cumulo_grids.h. Empty: the pure procedural
+  /// Replaces each layer by a sampled one; see levelset/cloud/layers_on_grids.h. Empty: the pure procedural
   /// form, exact and slow: (1 + 7 k)^M evaluations of the base per value for k steps and M layers.
   std::function<CumuloSampled(const CumuloStep&)> bake{};
   /// The exact surface point of `base` near x, such as the closest point of a mesh: taken by the first layer

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "nephele/levelset/cloud/cloud_density.h"
-#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/cloud/layers_on_grids.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/modeling/cloud/density_profile.h"

@@ -11,7 +11,7 @@
 
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/cloud/cloud_density.h"
-#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/cloud/layers_on_grids.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"

@@ -9,7 +9,7 @@
 //
 // Source: Tessendorf, Resolution Independent Volumes, 3.3.3, "Selectively sampling the levelset into grids".
 // Limits: base features thinner than two voxels of a layer's grid are not seen by the layers after it.
-#include "nephele/levelset/cloud/cumulo_grids.h"
+#include "nephele/levelset/cloud/layers_on_grids.h"
 
 #include <algorithm>
 #include <array>
@@ -20,6 +20,8 @@
 #include <string>
 #include <utility>
 
+#include "nephele/levelset/cloud/detail/layer_fields.h"
+#include "nephele/levelset/cloud/detail/layer_parts.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/cloud/renormalise.h"
 #include "nephele/levelset/grid/bake.h"
@@ -37,6 +39,10 @@ namespace nephele {
 namespace {
 
 using detail::BrickSamples;
+using detail::BrickSlab;
+using detail::kWholePositions;
+using detail::LayerPart;
+using detail::LayerParts;
 using detail::Packing;
 
 /// Samples per wave of the finest noise: of layers that others build on, of the last one, and the least.
@@ -58,12 +64,6 @@ constexpr float kFoundVoxels = 0.1f;
 /// and of how many samples there one is. Misses come in clusters: few samples of many bricks count better.
 constexpr std::size_t kSearchedBricks = 512;
 constexpr std::size_t kSearchedShare = 4;
-/// A layer with no more positions of bricks than this is baked in one piece: some hundred megabytes.
-constexpr double kWholePositions = 1 << 20;
-/// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
-/// copy less from their neighbours.
-constexpr int kPartBricks = 8;
-constexpr double kPartPositions = 1 << 18;
 /// Of a layer's time, the rest being spent on the sum for the next one.
 constexpr double kShareOfBake = 0.85;
 constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
@@ -86,204 +86,6 @@ float coarsestVoxel(const std::vector<CumuloLayer>& layers, float voxelSize) {
   for (std::size_t i = 0; i < layers.size(); ++i)
     coarsest = std::max(coarsest, cumuloVoxelSize(layers, i, voxelSize));
   return coarsest;
-}
-
-/// l_i to be baked at the voxels of the layer's own grid: l_{i-1} where the layer was not evaluated, read
-/// from its cheap form, and the full sum elsewhere.
-class GrownNode final : public FieldNode<float> {
- public:
-  GrownNode(const ScalarField& before, const ScalarField& level, const ScalarField& displacement)
-      : before_(before.node()), level_(level.node()), displacement_(displacement.node()) {}
-
-  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
-    Scratch::Frame frame(scratch);
-    float* grown = frame.lane();
-    displacement_->eval(points, {grown}, scratch);
-    if (before_ == level_) {
-      level_->eval(points, values, scratch);
-      for (int i = 0; i < points.count; ++i) values[0][i] += std::abs(grown[i]);
-      return;
-    }
-    const BlockLanes<3> where = frame.lanes<3>();
-    std::array<std::uint8_t, kBlockSize> origin;
-    int count = 0;
-    for (int i = 0; i < points.count; ++i) {
-      if (grown[i] == 0) continue;
-      where[0][count] = points.x[i];
-      where[1][count] = points.y[i];
-      where[2][count] = points.z[i];
-      origin[count++] = static_cast<std::uint8_t>(i);
-    }
-    if (count < points.count) level_->eval(points, values, scratch);
-    if (count == 0) return;
-    float* before = frame.lane();
-    before_->eval(scratch.pointBlock(where, count), {before}, scratch);
-    for (int i = 0; i < count; ++i) values[0][origin[i]] = before[i] + std::abs(grown[origin[i]]);
-  }
-
-  Interval range(const Box& box, RangeMemo& memo) const override {
-    const Interval grown = memo.of(displacement_, box);
-    return (grown.isPoint() ? memo.of(level_, box) : memo.of(before_, box)) + abs(grown);
-  }
-
- private:
-  NodePtr<float> before_, level_, displacement_;
-};
-
-/// The displacement of a layer for a bake that leaves out what cannot matter: its range is 0 where amplitudes
-/// near by are too small for this layer and those after it to bring the sum to the surface.
-class NeededNode final : public FieldNode<float> {
- public:
-  NeededNode(const CumuloStep& step, const std::vector<CumuloLayer>& layers, float voxelSize)
-      : displacement_(step.displacement.node()),
-        level_(step.level.node()),
-        reach_(step.reach),
-        margin_(step.margin),
-        voxelSize_(voxelSize) {
-    for (std::size_t i = step.index; i < layers.size(); ++i) {
-      heights_.push_back({layers[i].amplitude.node(), layers[i].noise.range(Box::everywhere()).magnitude()});
-      leastReach_ += layers[i].amplitude.range(Box::everywhere()).min * heights_.back().noiseBound;
-    }
-  }
-
-  static bool isOfUse(const CumuloStep& step, const std::vector<CumuloLayer>& layers) {
-    return std::any_of(
-        layers.begin() + std::ptrdiff_t(step.index), layers.end(),
-        [](const CumuloLayer& layer) { return !layer.amplitude.range(Box::everywhere()).isPoint(); });
-  }
-
-  void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
-    displacement_->eval(points, values, scratch);
-  }
-
-  Interval range(const Box& box, RangeMemo& memo) const override {
-    const Interval range = memo.of(displacement_, box);
-    if (range.isPoint()) return range;
-    const Interval level = memo.of(level_, box);
-    const float missing = -level.max - detail::kOuterShare * margin_;
-    // Wherever amplitudes are read from.
-    if (level.max > 0 || leastReach_ >= missing) return range;
-    // Levels rise from layer to layer: no later surface point is farther.
-    const float depth = std::min(-level.min, reach_ + margin_);
-    const Box near = box.expanded(detail::farthestSurfacePoint(depth, voxelSize_));
-    // Amplitudes in a box can take a search: the first often tell.
-    float reach = 0;
-    for (const Height& height : heights_) {
-      reach += memo.of(height.amplitude, near).max * height.noiseBound;
-      if (reach >= missing) return range;
-    }
-    return Interval::of(0);
-  }
-
- private:
-  struct Height {
-    NodePtr<float> amplitude;
-    float noiseBound;
-  };
-
-  NodePtr<float> displacement_, level_;
-  std::vector<Height> heights_;
-  float reach_, margin_, voxelSize_;
-  /// What the layers add at least where their noise is largest.
-  float leastReach_ = 0;
-};
-
-/// Bricks begin <= z < end.
-struct Slab {
-  int begin, end;
-
-  bool contains(int z) const { return z >= begin && z < end; }
-};
-
-/// How a layer is cut into parts.
-struct Parts {
-  Slab all;
-  int thickness, halo;
-
-  int count() const { return (all.end - all.begin + thickness - 1) / thickness; }
-  Slab operator[](int part) const {
-    return {all.begin + part * thickness, std::min(all.begin + (part + 1) * thickness, all.end)};
-  }
-  /// A part with its neighbours as far as they can reach it through the smoothing.
-  Slab around(int part) const {
-    const Slab own = (*this)[part];
-    return {std::max(own.begin - halo, all.begin), std::min(own.end + halo, all.end)};
-  }
-};
-
-/// The layout of a layer's grid at the bricks of `slab` inside a box, without bricks.
-BrickSamples noSamples(const Box& box, float voxelSize, const Slab& slab) {
-  BrickSamples samples;
-  samples.voxelSize = voxelSize;
-  for (int axis = 0; axis < 3; ++axis) {
-    samples.places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-    samples.places.count[axis] =
-        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.places.first[axis];
-  }
-  samples.places.first.z = slab.begin;
-  samples.places.count.z = slab.end - slab.begin;
-  samples.table.resize(samples.places.size());
-  detail::SampleStore background(BrickSamples::kCount);
-  samples.pool.push_back(background.data());
-  samples.ranges.push_back(Interval::of(0));
-  samples.stores.push_back({std::move(background), std::numeric_limits<int>::max()});
-  return samples;
-}
-
-/// `reach` is how far smoothing sees, in voxels.
-Parts partsOf(const Box& box, float voxelSize, int reach) {
-  const auto bricks = [&](int axis) {
-    return Slab{int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1,
-                int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2};
-  };
-  const auto size = [&](int axis) { return bricks(axis).end - bricks(axis).begin; };
-  const double across = double(size(0)) * size(1);
-  Parts parts{bricks(2), size(2), 1 + (reach + 1 + BrickGrid::kAfter) / BrickGrid::kBrick};
-  if (across * size(2) > kWholePositions)
-    parts.thickness = std::max({kPartBricks, parts.halo, int(kPartPositions / across)});
-  return parts;
-}
-
-/// A slab of a layer as it was sampled, with samples beside it that are of no use.
-struct Part {
-  Slab slab;
-  BrickSamples samples;
-};
-
-/// Copies of the bricks of `slab` from those of neighbouring parts.
-BrickSamples windowOf(const std::deque<Part>& parts, const Slab& slab, const Box& box, float voxelSize) {
-  /// Bricks along z that are given back together.
-  constexpr int kStoreBricks = 8;
-  BrickSamples window = noSamples(box, voxelSize, slab);
-  for (int z = slab.begin; z < slab.end; z += kStoreBricks) {
-    std::vector<Vec3i> bricks;
-    std::vector<const float*> sources;
-    for (const Part& part : parts) {
-      const Vec3i first = max(window.places.first, part.samples.places.first);
-      const Vec3i end = min(window.places.first + window.places.count,
-                            part.samples.places.first + part.samples.places.count);
-      const int lastZ = std::min({z + kStoreBricks, end.z, part.slab.end});
-      Vec3i b;
-      for (b.z = std::max({z, first.z, part.slab.begin}); b.z < lastZ; ++b.z)
-        for (b.y = first.y; b.y < end.y; ++b.y)
-          for (b.x = first.x; b.x < end.x; ++b.x) {
-            const std::int32_t pool = part.samples.poolIndex(b);
-            if (pool == 0) continue;
-            bricks.push_back(b);
-            sources.push_back(part.samples.pool[std::size_t(pool)]);
-          }
-    }
-    const std::size_t before = window.pool.size();
-    window.append(bricks);
-    parallelFor(bricks.size(), 64, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        float* copy = window.pool[before + i];
-        std::copy_n(sources[i], BrickSamples::kCount, copy);
-        window.ranges[before + i] = rangeOfSamples({copy, std::size_t(BrickSamples::kCount)});
-      }
-    });
-  }
-  return window;
 }
 
 class LayerSampler {
@@ -317,21 +119,18 @@ class LayerSampler {
   std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
     const Box box = options_.box.expanded(reach_ + step.margin);
     const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
-    const Parts cut = partsOf(box, voxel, smoothing.dilation + smoothing.steps);
-    const std::shared_ptr<BrickGrid> layer = detail::emptyPackedGrid(noSamples(box, voxel, cut.all));
-    const ScalarField needed =
-        NeededNode::isOfUse(step, layers_)
-            ? ScalarField(std::make_shared<NeededNode>(step, layers_, options_.voxelSize))
-            : step.displacement;
+    const LayerParts cut = detail::partsOf(box, voxel, smoothing.dilation + smoothing.steps);
+    const std::shared_ptr<BrickGrid> layer = detail::emptyPackedGrid(detail::noSamples(box, voxel, cut.all));
+    const ScalarField needed = detail::neededDisplacement(step, layers_, options_.voxelSize);
     const int count = cut.count();
-    std::deque<Part> parts;
+    std::deque<LayerPart> parts;
     const auto bakePart = [&](int part) {
       const SubProgress share(progress_, kShareOfBake * part / count, kShareOfBake * (part + 1) / count);
       parts.push_back({cut[part], bakeSlab(needed, cut[part], box, voxel, share)});
     };
     // The only part, or a part with what is around it.
     const auto takeWindow = [&](int part) {
-      if (count > 1) return windowOf(parts, cut.around(part), box, voxel);
+      if (count > 1) return detail::windowOf(parts, cut.around(part), box, voxel);
       BrickSamples all = std::move(parts[0].samples);
       all.separate();
       return all;
@@ -357,14 +156,14 @@ class LayerSampler {
   }
 
   /// The samples of the bricks of a slab.
-  BrickSamples bakeSlab(const ScalarField& displacement, const Slab& slab, const Box& box, float voxel,
+  BrickSamples bakeSlab(const ScalarField& displacement, const BrickSlab& slab, const Box& box, float voxel,
                         const Progress& progress) const {
     // All that interpolation in the slab's bricks reads, so that bricks are kept or dropped as in one piece.
     const float first = float(slab.begin * BrickGrid::kBrick - BrickGrid::kBefore) + 0.5f;
     const float last = float(slab.end * BrickGrid::kBrick - 1 + BrickGrid::kAfter) - 0.5f;
     const Box around{{box.min.x, box.min.y, first * voxel}, {box.max.x, box.max.y, last * voxel}};
     const Box inside = box.intersection(around);
-    if (inside.isEmpty()) return noSamples(box, voxel, slab);
+    if (inside.isEmpty()) return detail::noSamples(box, voxel, slab);
     return detail::bakeSamples(displacement,
                                {.voxelSize = voxel, .box = inside, .interpolation = Interpolation::tricubic},
                                progress);
@@ -400,9 +199,8 @@ class LayerSampler {
       return;
     }
     // At the grid's own voxels trilinear interpolation gives the samples.
-    level_ = detail::packed(detail::bakeSamples(
-        ScalarField(std::make_shared<GrownNode>(step.before, step.level, gridField(grid))), spec,
-        SubProgress(progress_, kShareOfBake, 1)));
+    level_ = detail::packed(detail::bakeSamples(detail::grownLevel(step.before, step.level, gridField(grid)),
+                                                spec, SubProgress(progress_, kShareOfBake, 1)));
     sampled.level = gridField(level_);
     sampled.surface = gridField(level_, Interpolation::tricubic);
   }
@@ -454,7 +252,7 @@ class LayerSampler {
 
   /// Adds what the part of a layer inside `slab` comes to, and leaves out the bricks that do not matter:
   /// keeps those whose sums are such that the layers after this one can bring them to the surface.
-  std::vector<Packing> judged(const CumuloStep& step, const BrickSamples& part, const Slab& slab,
+  std::vector<Packing> judged(const CumuloStep& step, const BrickSamples& part, const BrickSlab& slab,
                               Count& total) const {
     std::vector<PlacedBrick> bricks = part.placed;
     std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
@@ -565,8 +363,8 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
     const double width =
         double(reach) + (1 + double(detail::kOuterShare)) * margin + double(BrickGrid::kBrick) * voxel;
     const double bricks = kGrowth * area * width / std::pow(double(BrickGrid::kBrick) * voxel, 3);
-    const Parts cut = partsOf(box.expanded(displacementBound(layers) + margin), voxel,
-                              kLeastDilation + MedialSmoothingOptions{}.steps);
+    const LayerParts cut = detail::partsOf(box.expanded(displacementBound(layers) + margin), voxel,
+                                           kLeastDilation + MedialSmoothingOptions{}.steps);
     // Of a layer in parts: three, of which one has neighbours around it.
     const double share =
         std::min(1.0, (3.0 * cut.thickness + 3.0 * cut.halo) / double(cut.all.end - cut.all.begin));
