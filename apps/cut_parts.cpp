@@ -7,6 +7,7 @@
 #include "nephele/levelset/cut/cut_input.h"
 #include "nephele/levelset/cut/cut_level_set.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"
 

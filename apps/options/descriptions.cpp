@@ -83,7 +83,7 @@ Description volumeDescription(const std::string& path) {
 Description describeFile(const std::string& path, bool alwaysCountPairs) {
   const std::string extension = CLI::detail::to_lower(std::filesystem::path(path).extension().string());
   Description description;
-  if (extension == ".vdb" || extension == ".nvdb")
+  if (isVolumeFile(path))
     description = volumeDescription(path);
   else if (extension == ".exr" || extension == ".png" || extension == ".hdr")
     description = {{"kind", "image"}, {"content", describeImage(path)}};

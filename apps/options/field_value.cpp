@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "nephele/levelset/io/vdb_io.h"
+
 namespace nephele::apps {
 namespace {
 
@@ -30,10 +32,6 @@ std::vector<std::string> listed(const std::string& text) {
       parts.back() += c;
   }
   return parts;
-}
-
-bool isVolumeFile(const std::string& path) {
-  return path.ends_with(".vdb") || path.ends_with(".nvdb");
 }
 
 class Parser {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/options/cloud_quantities.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"
@@ -83,9 +84,9 @@ class Entry {
   /// A field of numbers from 0 to 1; a file alone is a mask.
   FieldValue share() const {
     const std::string typed = text();
-    const bool isFile =
-        (typed.find(".vdb") != std::string::npos || typed.find(".nvdb") != std::string::npos) &&
-        !typed.starts_with("mask:") && !typed.starts_with("attribute:");
+    // Behind the file's name, the grid's may stand.
+    const bool isFile = (isVolumeFile(typed) || isVolumeFile(typed.substr(0, typed.rfind(':')))) &&
+                        !typed.starts_with("mask:") && !typed.starts_with("attribute:");
     return parseFieldValue(fmt::format("{}: {}", place(), key), isFile ? "mask:" + typed + ":0,1" : typed,
                            {.low = 0, .high = 1});
   }

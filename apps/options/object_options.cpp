@@ -13,7 +13,7 @@ namespace nephele::apps {
 namespace {
 
 Mesh readObject(const std::string& path) {
-  if (!path.ends_with(".vdb")) return readMesh(path);
+  if (!isVolumeFile(path)) return readMesh(path);
   const VdbGrid grid = readScalarGrid(path);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
     throw Error(fmt::format("{}: grid '{}' is not a level set, which objects are", path, info.name));

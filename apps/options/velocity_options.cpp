@@ -116,7 +116,7 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
       refuseValue(name, text, "for curl a noise without creases: not worley, not worley_difference");
     return;
   }
-  if (!text.ends_with(".vdb") && !text.ends_with(".nvdb")) refuseValue(name, text, kForm);
+  if (!isVolumeFile(text)) refuseValue(name, text, kForm);
   velocity.source = VelocityArguments::Source::file;
   velocity.path = text;
 }

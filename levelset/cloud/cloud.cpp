@@ -2,7 +2,7 @@
 #include "nephele/levelset/cloud/cloud.h"
 
 #include <algorithm>
-#include <filesystem>
+#include <cmath>
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -14,13 +14,6 @@
 namespace nephele {
 
 namespace {
-
-bool isVolumeFile(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
-  return extension == ".vdb" || extension == ".nvdb";
-}
 
 Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
   const VdbGrid grid = readScalarGrid(path);

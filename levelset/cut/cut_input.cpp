@@ -13,10 +13,6 @@
 
 namespace nephele {
 
-bool isVolumeFile(const std::string& path) {
-  return path.ends_with(".vdb") || path.ends_with(".nvdb");
-}
-
 std::shared_ptr<const BrickGrid> readLevelSet(const std::string& path) {
   const VdbGrid grid = readScalarGrid(path);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)

@@ -11,9 +11,6 @@
 /// What a cut works with, from files.
 namespace nephele {
 
-/// Whether a path is that of a volume, by its name: .vdb or .nvdb.
-bool isVolumeFile(const std::string& path);
-
 /// The first scalar grid of a file, which must be a level set. @throws Error naming the path.
 std::shared_ptr<const BrickGrid> readLevelSet(const std::string& path);
 

@@ -274,6 +274,31 @@ Affine affineOf(const openvdb::GridBase& grid) {
 
 }  // namespace detail
 
+namespace {
+
+/// Places in the world are floats: where these are coarse beside the voxels between `first` and `last`, the
+/// grid would lie elsewhere, and its voxels upon each other.
+void requireResolvedVoxels(const openvdb::GridBase& grid, const Vec3i& first, const Vec3i& last) {
+  constexpr double kMostOfAVoxel = 0.125;
+  const openvdb::Mat4d m = grid.transform().baseMap()->getAffineMap()->getMat4();
+  double farthest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double reach = std::abs(m(3, axis));
+    for (int c = 0; c < 3; ++c)
+      reach += std::abs(m(c, axis)) * std::max(std::abs(double(first[c])), std::abs(double(last[c])));
+    farthest = std::max(farthest, reach);
+  }
+  const double voxel = std::cbrt(std::abs(m.det()));
+  const double error = farthest * double(std::numeric_limits<float>::epsilon()) / 2 / voxel;
+  require(
+      error <= kMostOfAVoxel,
+      fmt::format("grid {} lies as far as {:.6g} from the origin, with voxels of {:.6g}: single precision "
+                  "would move them by up to {:.2g} of their size; move the grid nearer to the origin",
+                  displayName(grid), farthest, voxel, error));
+}
+
+}  // namespace
+
 std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid) {
   const openvdb::FloatGrid::ConstPtr source = detail::floatGrid(grid);
   const std::string name = displayName(*source);
@@ -282,6 +307,8 @@ std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid) {
 
   auto result = std::make_shared<BrickGrid>();
   result->indexToWorld = detail::affineOf(*source);
+  if (!tree.empty())
+    requireResolvedVoxels(*source, tree.first() * kBrick, (tree.first() + tree.count()) * kBrick);
   result->worldToIndex = inverse(result->indexToWorld);
   result->voxelSize = std::cbrt(std::abs(determinant(result->indexToWorld.linear)));
   result->background = sign * source->background();

@@ -20,6 +20,12 @@ namespace {
   throw Error(fmt::format("{}: {}", path, reason));
 }
 
+std::string lowerExtension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension;
+}
+
 void checkReadable(const std::string& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
@@ -53,7 +59,7 @@ std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const det
   checkReadable(path);
   detail::initializeOpenVdb();
   return translateReadErrors(path, [&] {
-    return path.ends_with(".nvdb") ? detail::readNanoVdb(path) : detail::readOpenVdb(path, wanted);
+    return lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path) : detail::readOpenVdb(path, wanted);
   });
 }
 
@@ -95,6 +101,11 @@ std::array<VdbGrid, 3> components(const VectorGrid& grid) {
 }
 
 }  // namespace
+
+bool isVolumeFile(const std::string& path) {
+  const std::string extension = lowerExtension(path);
+  return extension == ".vdb" || extension == ".nvdb";
+}
 
 std::vector<VdbGrid> readVdbFile(const std::string& path) {
   std::vector<VdbGrid> result;

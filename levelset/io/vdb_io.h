@@ -46,6 +46,9 @@ struct VdbGridInfo {
 
 VdbGridInfo describe(const VdbGrid& grid);
 
+/// Whether a path is that of a volume, by its name: .vdb or .nvdb, in small or capital letters.
+bool isVolumeFile(const std::string& path);
+
 /// Every grid of a .vdb or .nvdb file. @throws Error naming the path and what is wrong, also where the file
 /// is cut short but OpenVDB would read it silently.
 std::vector<VdbGrid> readVdbFile(const std::string& path);
@@ -65,6 +68,8 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
 std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid);
 
 /// Bricks of a scalar grid. A level set changes sign (positive inside); fog keeps its values.
+/// @throws Error naming the grid if it holds no scalars, is too large, not finite, or so far from the origin
+/// that single precision would move a voxel by more than an eighth of its size.
 std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid);
 
 /// What a file says of a grid beside its values.

@@ -139,6 +139,23 @@ TEST(VdbIo, TransformsComeBack) {
   }
 }
 
+TEST(VdbIo, GridsFarFromTheOriginKeepTheirPlaceOrAreRefused) {
+  // Beside 1e5, floats are 2^-7 apart: a voxel of 1 keeps its place, one of 0.01 would move by as much as
+  // 2^-8, which is 0.39 of it. At 100, where floats are 2^-17 apart, it may stay.
+  const TemporaryFolder folder;
+  BrickGrid bricks = smallGrid(0.0f, 1.0f);
+  const auto readAt = [&](float voxel, float x) {
+    bricks.indexToWorld = {Mat3f::scaling(voxel), {x, 0, 0}};
+    writeVdbFile(folder.file("far.vdb"), {toVdb(bricks, {"density", Class::fogVolume})}, {});
+    return toBricks(readScalarGrid(folder.file("far.vdb")));
+  };
+  EXPECT_EQ(readAt(1.0f, 1e5f)->indexToWorld(Vec3f{3, 0, 0}).x, 100003.0f);
+  EXPECT_NEAR(readAt(0.01f, 100.0f)->indexToWorld(Vec3f{3, 0, 0}).x, 100.03f, 1e-5f);
+  const std::string message = errorOf([&] { readAt(0.01f, 1e5f); });
+  for (const char* part : {"'density'", "100000", "0.01"})
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+}
+
 TEST(VdbIo, MetadataIsWrittenToEveryGrid) {
   const TemporaryFolder folder;
   const BrickGrid bricks = smallGrid(0.0f, 1.0f);
