@@ -173,6 +173,7 @@ void requireOptions(const AttributeFieldOptions& options) {
 }
 
 void requireTriangles(const Mesh& mesh) {
+  requireValid(mesh);
   require(mesh.faceCount() > 0, "attribute field: the mesh has no faces");
   require(mesh.isTriangles(), "attribute field: the mesh must be triangulated");
 }

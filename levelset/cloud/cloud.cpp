@@ -76,6 +76,7 @@ RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair,
 }
 
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+  requireValid(mesh);
   require(options.voxelSize > 0,
           "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
@@ -111,6 +112,7 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
 }
 
 double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
+  requireValid(mesh);
   // Measured, bytes: the program itself; the mesh and what finds its closest points, per face; the distance
   // to it, per voxel of its area; and both while they are made. The result stores leaves of 8 voxels on an
   // edge that layers make larger.

@@ -127,6 +127,7 @@ MeshPieces cutLevelSet(const BrickGrid& level, const LevelSetCutOptions& options
 
 MeshPieces cutLevelSet(const BrickGrid& level, const Mesh& whole, const LevelSetCutOptions& options,
                        const Progress& progress) {
+  requireValid(whole);
   MeshCutOptions flat{.kerf = options.kerf};
   flat.minVolume = options.minVolume.value_or(std::abs(double(determinant(level.indexToWorld.linear))));
   std::vector<std::tuple<Vec3f, Vec3f>> planes;

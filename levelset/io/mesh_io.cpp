@@ -207,6 +207,7 @@ Mesh readMesh(const std::string& path) {
 }
 
 void writeMesh(const std::string& path, const Mesh& mesh) {
+  requireValid(mesh);
   const std::string extension = lowerExtension(path);
   void (*write)(std::FILE*, const Mesh&) = extension == ".obj"   ? detail::writeObj
                                            : extension == ".ply" ? detail::writePly

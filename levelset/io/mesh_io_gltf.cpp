@@ -1,21 +1,15 @@
 // glTF 2, text (.gltf) and binary (.glb): the triangles of the default scene in world coordinates.
 //
-// Read from the specification with a JSON parser and nothing else, because a hostile file must end in a
-// message: every offset, count and index is held against the bytes that are there before it is used, and no
-// node is visited twice. Node transforms are applied; a mirroring one turns the winding, as the specification
-// asks. Texture coordinates have their origin at the top left in glTF; V is flipped to the bottom left that
-// the other formats use. Materials, skins, morph targets and animations are left out. Sparse accessors and
-// quantised attributes are read; compressed geometry is refused by the name of the extension.
+// No node is visited twice. Node transforms are applied; a mirroring one turns the winding, as the
+// specification asks. Texture coordinates have their origin at the top left in glTF; V is flipped to the
+// bottom left that the other formats use. Materials, skins, morph targets and animations are left out.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <limits>
-#include <nlohmann/json.hpp>
 
+#include "nephele/levelset/io/detail/gltf_document.h"
 #include "nephele/levelset/io/detail/mesh_io_private.h"
 #include "nephele/modeling/base/error.h"
 
@@ -24,8 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
-constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 constexpr std::size_t kMostVertices = std::size_t{1} << 31;
 
 // x -> m * (x, 1), rows of four.
@@ -51,68 +43,11 @@ struct Transform {
   }
 };
 
-// Elements of an accessor: `components` numbers each.
-struct Values {
-  std::size_t count = 0;
-  std::size_t components = 0;
-  std::vector<double> numbers;
-
-  double at(std::size_t element, std::size_t component) const {
-    return numbers[element * components + component];
-  }
-};
-
-std::string decodeBase64(std::string_view text) {
-  std::string bytes;
-  std::uint32_t bits = 0;
-  int count = 0;
-  for (const char c : text) {
-    int digit = -1;
-    if (c >= 'A' && c <= 'Z')
-      digit = c - 'A';
-    else if (c >= 'a' && c <= 'z')
-      digit = c - 'a' + 26;
-    else if (c >= '0' && c <= '9')
-      digit = c - '0' + 52;
-    else if (c == '+')
-      digit = 62;
-    else if (c == '/')
-      digit = 63;
-    else
-      continue;
-    bits = bits << 6 | static_cast<std::uint32_t>(digit);
-    count += 6;
-    if (count >= 8) {
-      count -= 8;
-      bytes += static_cast<char>(bits >> count & 0xFF);
-    }
-  }
-  return bytes;
-}
-
-std::string decodePercent(std::string_view text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    unsigned code = 0;
-    if (text[i] == '%' && i + 2 < text.size() &&
-        std::sscanf(std::string(text.substr(i + 1, 2)).c_str(), "%2x", &code) == 1) {
-      result += static_cast<char>(code);
-      i += 2;
-    } else {
-      result += text[i];
-    }
-  }
-  return result;
-}
-
 class GltfReader {
  public:
-  explicit GltfReader(const MeshFile& file) : file_(file) {}
+  explicit GltfReader(const MeshFile& file) : file_(file), document_(file) {}
 
   Mesh read() {
-    parse();
-    checkExtensions();
-    loadBuffers();
     walkNodes();
     for (std::size_t set = 0; set < uvSets_.size(); ++set) {
       if (uvSets_[set].empty()) continue;
@@ -128,231 +63,6 @@ class GltfReader {
   }
 
  private:
-  // ---- container ----
-  std::uint32_t wordAt(std::size_t offset) const {
-    std::uint32_t word = 0;
-    std::memcpy(&word, file_.bytes.data() + offset, 4);
-    return word;
-  }
-
-  void parse() {
-    std::string_view text = file_.bytes;
-    if (file_.bytes.starts_with("glTF")) {
-      if (file_.bytes.size() < 20) file_.fail("is cut short: no room for a GLB header");
-      if (wordAt(4) != 2)
-        file_.fail(fmt::format("is GLB version {}; only version 2 is supported", wordAt(4)));
-      const std::size_t declared = wordAt(8);
-      if (declared > file_.bytes.size())
-        file_.fail(
-            fmt::format("is cut short: it declares {} bytes but holds {}", declared, file_.bytes.size()));
-      text = {};
-      for (std::size_t offset = 12; offset + 8 <= declared;) {
-        const std::size_t length = wordAt(offset);
-        const std::uint32_t type = wordAt(offset + 4);
-        if (length > declared - offset - 8) file_.fail("a chunk runs over the end of the file");
-        const std::string_view chunk = file_.bytes.substr(offset + 8, length);
-        if (type == kJsonChunk && text.empty()) text = chunk;
-        if (type == kBinaryChunk && binary_.empty()) binary_ = chunk;
-        offset += 8 + length;
-      }
-      if (text.empty()) file_.fail("has no JSON chunk");
-    } else if (file_.path.ends_with(".glb") || file_.path.ends_with(".GLB")) {
-      file_.fail("does not start with 'glTF'");
-    }
-    root_ = json::parse(text);
-    if (!root_.is_object()) file_.fail("the JSON part is not an object");
-    const std::string version = member(root_, "asset").value("version", "");
-    if (!version.starts_with("2."))
-      file_.fail(fmt::format("is glTF version {}; only 2.x is supported", excerpt(version)));
-  }
-
-  void checkExtensions() const {
-    if (!root_.contains("extensionsRequired")) return;
-    for (const json& entry : list(root_, "extensionsRequired")) {
-      const std::string name = entry.get<std::string>();
-      const bool leavesGeometryAlone = name == "KHR_mesh_quantization" ||
-                                       name.starts_with("KHR_materials_") ||
-                                       name.starts_with("KHR_texture_") || name.starts_with("EXT_texture_") ||
-                                       name.starts_with("KHR_lights_") || name.starts_with("EXT_lights_");
-      if (!leavesGeometryAlone)
-        file_.fail(fmt::format("requires the extension {}, which is not supported", excerpt(name)));
-    }
-  }
-
-  void loadBuffers() {
-    for (const json& buffer : list(root_, "buffers")) {
-      const std::size_t length = size(buffer, "byteLength");
-      std::string bytes;
-      if (!buffer.contains("uri")) {
-        bytes = binary_;
-      } else {
-        const std::string uri = buffer.at("uri").get<std::string>();
-        if (uri.starts_with("data:")) {
-          const std::size_t comma = uri.find(";base64,");
-          if (comma == std::string::npos) file_.fail("a buffer is a data URI but not base64");
-          bytes = decodeBase64(std::string_view(uri).substr(comma + 8));
-        } else {
-          bytes =
-              readWholeFile((std::filesystem::path(file_.path).parent_path() / decodePercent(uri)).string());
-        }
-      }
-      if (bytes.size() < length)
-        file_.fail(
-            fmt::format("buffer {} declares {} bytes but holds {}", buffers_.size(), length, bytes.size()));
-      bytes.resize(length);
-      buffers_.push_back(std::move(bytes));
-    }
-  }
-
-  // ---- JSON with checks ----
-  const json& member(const json& object, const char* key) const {
-    const auto found = object.is_object() ? object.find(key) : object.end();
-    if (!object.is_object() || found == object.end())
-      file_.fail(fmt::format("'{}' is missing in the JSON part", key));
-    return *found;
-  }
-  // The list under `key`, empty if there is none.
-  const json& list(const json& object, const char* key) const {
-    static const json kEmpty = json::array();
-    if (!object.is_object() || !object.contains(key)) return kEmpty;
-    if (!object.at(key).is_array()) file_.fail(fmt::format("'{}' is not a list", key));
-    return object.at(key);
-  }
-  std::size_t size(const json& object, const char* key) const {
-    const json& value = member(object, key);
-    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > 0xFFFFFFFFFFull)
-      file_.fail(fmt::format("'{}' should be a whole number >= 0", key));
-    return value.get<std::size_t>();
-  }
-  std::size_t size(const json& object, const char* key, std::size_t fallback) const {
-    return object.is_object() && object.contains(key) ? size(object, key) : fallback;
-  }
-  const json& item(const char* listName, std::size_t index) const {
-    const json& items = list(root_, listName);
-    if (index >= items.size())
-      file_.fail(fmt::format("refers to entry {} of '{}', which has {}", index, listName, items.size()));
-    return items[index];
-  }
-
-  // ---- accessors ----
-  static std::size_t componentSize(std::size_t type) {
-    switch (type) {
-      case 5120:
-      case 5121:
-        return 1;
-      case 5122:
-      case 5123:
-        return 2;
-      case 5125:
-      case 5126:
-        return 4;
-      default:
-        return 0;
-    }
-  }
-
-  template <class T>
-  static double load(const char* at, double scale) {
-    T value;
-    std::memcpy(&value, at, sizeof value);
-    return static_cast<double>(value) * scale;
-  }
-  static double number(const char* at, std::size_t type, bool normalized) {
-    switch (type) {
-      case 5120:
-        return normalized ? std::max(load<std::int8_t>(at, 1.0 / 127), -1.0) : load<std::int8_t>(at, 1);
-      case 5121:
-        return load<std::uint8_t>(at, normalized ? 1.0 / 255 : 1);
-      case 5122:
-        return normalized ? std::max(load<std::int16_t>(at, 1.0 / 32767), -1.0) : load<std::int16_t>(at, 1);
-      case 5123:
-        return load<std::uint16_t>(at, normalized ? 1.0 / 65535 : 1);
-      case 5125:
-        return load<std::uint32_t>(at, 1);
-      default:
-        return load<float>(at, 1);
-    }
-  }
-
-  // `count` elements of `elementSize` bytes in a buffer view, `stride` apart (set from the view where it has
-  // one).
-  const char* window(std::size_t viewIndex, std::size_t offset, std::size_t count, std::size_t elementSize,
-                     std::size_t& stride) const {
-    const json& view = item("bufferViews", viewIndex);
-    const std::size_t bufferIndex = size(view, "buffer");
-    if (bufferIndex >= buffers_.size())
-      file_.fail(fmt::format("refers to buffer {}, which is not there", bufferIndex));
-    const std::size_t viewOffset = size(view, "byteOffset", 0), viewLength = size(view, "byteLength");
-    const std::string& buffer = buffers_[bufferIndex];
-    if (viewOffset > buffer.size() || viewLength > buffer.size() - viewOffset)
-      file_.fail(fmt::format("buffer view {} runs over the end of its buffer", viewIndex));
-    stride = size(view, "byteStride", elementSize);
-    if (stride < elementSize || stride > 4096)
-      file_.fail(fmt::format("buffer view {} has a bad byteStride", viewIndex));
-    const bool fits = count == 0 || (offset <= viewLength && elementSize <= viewLength - offset &&
-                                     count - 1 <= (viewLength - offset - elementSize) / stride);
-    if (!fits)
-      file_.fail(
-          fmt::format("an accessor of {} elements runs over the end of buffer view {}", count, viewIndex));
-    return buffer.data() + viewOffset + offset;
-  }
-
-  Values readAccessor(std::size_t index) const {
-    const json& accessor = item("accessors", index);
-    static constexpr std::pair<std::string_view, std::size_t> kTypes[] = {
-        {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}};
-    const std::string typeName = member(accessor, "type").get<std::string>();
-    Values values;
-    for (const auto& [name, components] : kTypes)
-      if (name == typeName) values.components = components;
-    const std::size_t type = size(accessor, "componentType");
-    if (values.components == 0 || componentSize(type) == 0)
-      file_.fail(fmt::format("accessor {} has an unsupported type ({}, {})", index, excerpt(typeName), type));
-    const bool normalized = accessor.value("normalized", false);
-    const std::size_t elementSize = values.components * componentSize(type);
-    values.count = size(accessor, "count");
-
-    if (accessor.contains("bufferView")) {
-      std::size_t stride = 0;
-      const char* first = window(size(accessor, "bufferView"), size(accessor, "byteOffset", 0), values.count,
-                                 elementSize, stride);
-      values.numbers.resize(values.count * values.components);
-      for (std::size_t i = 0; i < values.count; ++i)
-        for (std::size_t k = 0; k < values.components; ++k)
-          values.numbers[i * values.components + k] =
-              number(first + i * stride + k * componentSize(type), type, normalized);
-    } else {
-      // Zeros without bytes behind them: the only count that the file's size does not bound.
-      if (values.count > (1u << 24))
-        file_.fail(fmt::format("accessor {} declares {} elements without data", index, values.count));
-      values.numbers.assign(values.count * values.components, 0.0);
-    }
-
-    if (accessor.contains("sparse")) {
-      const json& sparse = accessor.at("sparse");
-      const json& where = member(sparse, "indices");
-      const json& what = member(sparse, "values");
-      const std::size_t count = size(sparse, "count"), indexType = size(where, "componentType");
-      if (componentSize(indexType) == 0)
-        file_.fail(fmt::format("accessor {} has unsupported sparse indices", index));
-      std::size_t indexStride = 0, valueStride = 0;
-      const char* indices = window(size(where, "bufferView"), size(where, "byteOffset", 0), count,
-                                   componentSize(indexType), indexStride);
-      const char* data =
-          window(size(what, "bufferView"), size(what, "byteOffset", 0), count, elementSize, valueStride);
-      for (std::size_t i = 0; i < count; ++i) {
-        const double at = number(indices + i * indexStride, indexType, false);
-        if (!(at >= 0) || !(at < static_cast<double>(values.count)))
-          file_.fail(fmt::format("accessor {}: sparse index {} is out of range", index, at));
-        for (std::size_t k = 0; k < values.components; ++k)
-          values.numbers[static_cast<std::size_t>(at) * values.components + k] =
-              number(data + i * valueStride + k * componentSize(type), type, normalized);
-      }
-    }
-    return values;
-  }
-
-  // ---- scene ----
   static Transform localTransform(const json& node) {
     Transform t;
     if (node.contains("matrix")) {
@@ -379,7 +89,7 @@ class GltfReader {
       std::size_t node;
       Transform parent;
     };
-    const json& nodes = list(root_, "nodes");
+    const json& nodes = document_.list(document_.root(), "nodes");
     std::vector<Visit> open;
     const auto addAll = [&](const json& indices, const Transform& parent) {
       // Backwards, so that the first child is visited first.
@@ -388,12 +98,13 @@ class GltfReader {
         open.push_back({indices[i].get<std::size_t>(), parent});
       }
     };
-    if (!list(root_, "scenes").empty()) {
-      addAll(list(item("scenes", size(root_, "scene", 0)), "nodes"), {});
+    if (!document_.list(document_.root(), "scenes").empty()) {
+      addAll(document_.list(document_.item("scenes", document_.size(document_.root(), "scene", 0)), "nodes"),
+             {});
     } else {
       std::vector<bool> isChild(nodes.size());
       for (const json& node : nodes)
-        for (const json& child : list(node, "children"))
+        for (const json& child : document_.list(node, "children"))
           if (child.is_number_unsigned() && child.get<std::size_t>() < nodes.size())
             isChild[child.get<std::size_t>()] = true;
       for (std::size_t i = nodes.size(); i-- > 0;)
@@ -404,34 +115,34 @@ class GltfReader {
     while (!open.empty()) {
       const Visit visit = open.back();
       open.pop_back();
-      const json& node = item("nodes", visit.node);
+      const json& node = document_.item("nodes", visit.node);
       if (!node.is_object()) file_.fail(fmt::format("node {} is not an object", visit.node));
       if (visited[visit.node])
         file_.fail(fmt::format("node {} has two parents or is its own ancestor", visit.node));
       visited[visit.node] = true;
       const Transform world = visit.parent * localTransform(node);
-      addAll(list(node, "children"), world);
-      if (node.contains("mesh")) addMesh(size(node, "mesh"), node.value("name", ""), world);
+      addAll(document_.list(node, "children"), world);
+      if (node.contains("mesh")) addMesh(document_.size(node, "mesh"), node.value("name", ""), world);
     }
   }
 
   void addMesh(std::size_t index, std::string name, const Transform& world) {
-    const json& mesh = item("meshes", index);
+    const json& mesh = document_.item("meshes", index);
     if (name.empty()) name = mesh.value("name", "");
     if (name.empty()) name = fmt::format("mesh_{}", index);
     const auto firstFace = static_cast<std::uint32_t>(mesh_.faceCount());
     std::size_t primitive = 0;
-    for (const json& entry : list(mesh, "primitives"))
+    for (const json& entry : document_.list(mesh, "primitives"))
       addPrimitive(entry, fmt::format("mesh {} primitive {}", index, primitive++), world);
     const auto faceCount = static_cast<std::uint32_t>(mesh_.faceCount()) - firstFace;
     if (faceCount > 0) mesh_.groups.push_back({name, firstFace, faceCount});
   }
 
   void addPrimitive(const json& primitive, const std::string& where, const Transform& world) {
-    const std::size_t mode = size(primitive, "mode", 4);
+    const std::size_t mode = document_.size(primitive, "mode", 4);
     if (mode < 4 || mode > 6) return;  // points and lines
-    const json& attributes = member(primitive, "attributes");
-    const Values positions = readAccessor(size(attributes, "POSITION"));
+    const json& attributes = document_.member(primitive, "attributes");
+    const GltfValues positions = document_.readAccessor(document_.size(attributes, "POSITION"));
     if (positions.components != 3) file_.fail(fmt::format("{}: POSITION is not VEC3", where));
     const std::size_t base = mesh_.positions.size();
     if (base + positions.count > kMostVertices) file_.fail("has more than 2147483648 vertices");
@@ -443,7 +154,7 @@ class GltfReader {
 
     std::vector<std::uint32_t> indices;
     if (primitive.contains("indices")) {
-      const Values values = readAccessor(size(primitive, "indices"));
+      const GltfValues values = document_.readAccessor(document_.size(primitive, "indices"));
       if (values.components != 1) file_.fail(fmt::format("{}: indices are not SCALAR", where));
       for (const double value : values.numbers) {
         if (!(value >= 0) || !(value < static_cast<double>(positions.count)) || value != std::floor(value))
@@ -482,7 +193,7 @@ class GltfReader {
     for (std::size_t set = 0; set < uvSets_.size(); ++set) {
       const std::string key = fmt::format("TEXCOORD_{}", set);
       if (!attributes.contains(key)) continue;
-      const Values uv = readAccessor(size(attributes, key.c_str()));
+      const GltfValues uv = document_.readAccessor(document_.size(attributes, key.c_str()));
       if (uv.components != 2 || uv.count != positions.count)
         file_.fail(fmt::format("{}: {} does not fit POSITION", where, key));
       std::vector<float>& values = uvSets_[set];
@@ -493,7 +204,7 @@ class GltfReader {
       }
     }
     if (attributes.contains("COLOR_0")) {
-      const Values color = readAccessor(size(attributes, "COLOR_0"));
+      const GltfValues color = document_.readAccessor(document_.size(attributes, "COLOR_0"));
       if (color.components < 3 || color.count != positions.count)
         file_.fail(fmt::format("{}: COLOR_0 does not fit POSITION", where));
       colors_.resize(4 * base, 1.0f);
@@ -504,9 +215,7 @@ class GltfReader {
   }
 
   const MeshFile& file_;
-  json root_;
-  std::string_view binary_;
-  std::vector<std::string> buffers_;
+  GltfDocument document_;
   std::array<std::vector<float>, 4> uvSets_;
   std::vector<float> colors_;
   Mesh mesh_;

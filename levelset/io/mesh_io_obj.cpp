@@ -38,7 +38,8 @@ struct IndexRange {
       return static_cast<std::uint32_t>(index - 1);
     }
     if (index == 0) scanner.fail(fmt::format("{} index 0 (indices start at 1)", name));
-    if (static_cast<std::uint64_t>(-index) > count)
+    // -index overflows for the lowest integer.
+    if (std::uint64_t{0} - static_cast<std::uint64_t>(index) > count)
       scanner.fail(fmt::format("{} index {} is out of range ({} so far)", name, index, count));
     return static_cast<std::uint32_t>(static_cast<std::int64_t>(count) + index);
   }

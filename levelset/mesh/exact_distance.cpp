@@ -121,6 +121,7 @@ class ExactClosestNode final : public FieldNode<Vec3f> {
 }  // namespace
 
 ExactDistance::ExactDistance(const Mesh& mesh) {
+  requireValid(mesh);
   require(mesh.faceCount() > 0, "exact distance: the mesh has no faces");
   require(mesh.isTriangles(), "exact distance: the mesh must be triangulated");
   Vec3d low(1, 1, 1), high;

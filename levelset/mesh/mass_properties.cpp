@@ -8,6 +8,7 @@
 namespace nephele {
 
 MassProperties massProperties(const Mesh& mesh) {
+  requireValid(mesh);
   MassProperties result;
   if (mesh.corners.empty()) return result;
   Vec3d low = mesh.positions[mesh.corners[0]], high = low;

@@ -88,6 +88,7 @@ std::size_t countDuplicates(const Mesh& mesh, std::span<const std::uint32_t> ver
 }  // namespace
 
 MeshDiagnosis diagnose(const Mesh& mesh) {
+  requireValid(mesh);
   MeshDiagnosis d;
   const std::size_t positionCount = mesh.positions.size();
   const std::vector<std::uint32_t> vertexOf = firstEqualPosition(mesh.positions);

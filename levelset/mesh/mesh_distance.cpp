@@ -484,6 +484,7 @@ std::shared_ptr<BrickGrid> bandLevel(const Mesh& mesh, const detail::SurfaceGeom
 }  // namespace
 
 ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options, const Progress& progress) {
+  requireValid(mesh);
   const double h = options.voxelSize;
   require(std::isfinite(h) && h > 0, fmt::format("mesh distance: the voxel size must be > 0, got {}", h));
   require(std::isfinite(options.exteriorBand) && options.exteriorBand > 0 &&

@@ -275,7 +275,7 @@ class Ladder {
 }  // namespace
 
 RepairedMesh repairMesh(const Mesh& mesh, const MeshRepairOptions& options, const Progress& progress) {
-  return Ladder(mesh, options, progress).run();
+  return Ladder(requireValid(mesh), options, progress).run();
 }
 
 }  // namespace nephele

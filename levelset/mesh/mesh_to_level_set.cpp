@@ -82,6 +82,7 @@ void checkVolume(const Mesh& mesh, const VdbGrid& grid, double voxelSize, const 
 }
 
 void checkMesh(const Mesh& mesh) {
+  requireValid(mesh);
   require(mesh.faceCount() > 0, "level set: the mesh has no faces");
   require(mesh.isTriangles(), "level set: the mesh must be triangulated");
   for (const Vec3d& p : mesh.positions)
@@ -137,6 +138,7 @@ double enclosedVolume(const VdbGrid& levelSet) {
 }
 
 double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options) {
+  requireValid(mesh);
   // Bricks that a slab of the band's width touches, by area; per brick its samples, its leaf and the
   // triangles near it.
   constexpr double kBrickBytes = 9000.0;

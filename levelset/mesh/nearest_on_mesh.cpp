@@ -120,7 +120,7 @@ struct NearestOnMesh::Hierarchy {
 };
 
 NearestOnMesh::NearestOnMesh(const Mesh& mesh)
-    : hierarchy_(std::make_unique<Hierarchy>()), box_(boundingBox(mesh)) {
+    : hierarchy_(std::make_unique<Hierarchy>()), box_(boundingBox(requireValid(mesh))) {
   require(mesh.faceCount() > 0, "closest point: the mesh has no faces");
   require(mesh.isTriangles(), "closest point: the mesh must be triangulated");
   require(isFinite(box_.min) && isFinite(box_.max),

@@ -168,7 +168,7 @@ class Pairs {
 }  // namespace
 
 std::optional<std::size_t> countSelfIntersections(const Mesh& mesh) {
-  const Mesh triangles = triangulated(detail::withMergedPositions(mesh));
+  const Mesh triangles = triangulated(detail::withMergedPositions(requireValid(mesh)));
   const Pairs pairs(triangles);
   const BoxTree tree(pairs.boxes());
   std::atomic<std::size_t> count{0};

@@ -48,6 +48,7 @@ struct Placed {
 };
 
 Placed atOrigin(const Mesh& mesh, const char* name) {
+  requireValid(mesh);
   require(mesh.faceCount() > 0, fmt::format("warp: the {} has no faces", name));
   require(mesh.isTriangles(), fmt::format("warp: the {} must be triangulated", name));
   Vec3d low = mesh.positions.at(0), high = low;

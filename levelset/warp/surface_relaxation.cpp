@@ -103,6 +103,7 @@ Patches patchesAround(const Mesh& object, const std::vector<std::uint8_t>& isTor
 }
 
 void requireImages(const char* what, const Mesh& object, std::span<const Vec3d> images) {
+  requireValid(object);
   require(images.size() == object.positions.size(),
           fmt::format("{}: {} images for {} positions", what, images.size(), object.positions.size()));
   require(object.isTriangles(), fmt::format("{}: the object must be triangulated", what));
@@ -126,6 +127,7 @@ struct SurfaceRelaxation::Parts {
 };
 
 SurfaceRelaxation::SurfaceRelaxation(const ExactDistance& reference, const Mesh& object) {
+  requireValid(object);
   require(object.isTriangles(), "relaxation: the object must be triangulated");
   parts_ = std::make_unique<Parts>(reference, object);
 }

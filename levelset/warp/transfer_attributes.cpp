@@ -294,6 +294,8 @@ MeshAttribute ofCorners(const AttributeCharts& charts, const MeshAttribute& attr
 
 Mesh transferAttributes(const Mesh& reference, const Mesh& object, std::span<const Vec3d> images,
                         const TransferOptions& options, const Progress& progress) {
+  requireValid(reference);
+  requireValid(object);
   require(images.size() == object.positions.size(),
           fmt::format("transfer: {} images for {} positions", images.size(), object.positions.size()));
   for (const Vec3d& p : images) require(isFinite(p), "transfer: an image is not finite");

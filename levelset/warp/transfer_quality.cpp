@@ -170,6 +170,8 @@ double coverageOf(const detail::ReferenceSurface& reference, const std::vector<T
 
 TransferQuality transferQuality(const Mesh& reference, const Mesh& object, std::span<const Vec3d> images,
                                 const Progress& progress) {
+  requireValid(reference);
+  requireValid(object);
   require(images.size() == object.positions.size() || images.size() == object.corners.size(),
           fmt::format("transfer quality: {} images for {} positions and {} corners", images.size(),
                       object.positions.size(), object.corners.size()));

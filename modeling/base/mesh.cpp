@@ -8,6 +8,9 @@
 
 #include <bit>
 #include <cstring>
+#include <string>
+
+#include "nephele/modeling/base/error.h"
 
 namespace nephele {
 namespace {
@@ -55,6 +58,38 @@ void appendItem(const MeshAttribute& source, std::size_t from, std::vector<float
 
 }  // namespace
 
+const Mesh& requireValid(const Mesh& mesh) {
+  const auto number = [](auto value) { return std::to_string(value); };
+  const std::size_t cornerCount = mesh.corners.size(), positionCount = mesh.positions.size();
+  require(!mesh.faceStart.empty() && mesh.faceStart.front() == 0,
+          "mesh: the first face must start at corner 0");
+  for (std::size_t f = 0; f < mesh.faceCount(); ++f)
+    if (mesh.faceStart[f] > mesh.faceStart[f + 1])
+      throw Error("mesh: face " + number(f) + " ends before it starts");
+  if (mesh.faceStart.back() != cornerCount)
+    throw Error("mesh: the faces have " + number(mesh.faceStart.back()) + " corners, but there are " +
+                number(cornerCount));
+  for (std::size_t c = 0; c < cornerCount; ++c)
+    if (mesh.corners[c] >= positionCount)
+      throw Error("mesh: corner " + number(c) + " is at position " + number(mesh.corners[c]) +
+                  ", but there are " + number(positionCount) + " positions");
+  for (const MeshAttribute& a : mesh.attributes) {
+    const bool ofVertices = a.domain == MeshAttribute::Domain::vertex;
+    const std::size_t count = ofVertices ? positionCount : cornerCount;
+    if (a.width < 0 || a.values.size() != count * static_cast<std::size_t>(a.width))
+      throw Error("mesh: attribute '" + a.name + "' has " + number(a.values.size()) + " values for " +
+                  number(count) + (ofVertices ? " positions" : " corners") + ", " + number(a.width) +
+                  " each");
+  }
+  for (const MeshGroup& group : mesh.groups) {
+    const std::size_t end = std::size_t{group.firstFace} + group.faceCount;
+    if (end > mesh.faceCount())
+      throw Error("mesh: group '" + group.name + "' ends behind face " + number(end) + ", but there are " +
+                  number(mesh.faceCount()) + " faces");
+  }
+  return mesh;
+}
+
 Box boundingBox(const Mesh& mesh) {
   const Bounds bounds = usedBounds(mesh);
   if (bounds.empty) return {};
@@ -62,6 +97,7 @@ Box boundingBox(const Mesh& mesh) {
 }
 
 Mesh triangulated(const Mesh& mesh) {
+  requireValid(mesh);
   if (mesh.isTriangles()) {
     bool everyFace = true;
     for (std::size_t f = 0; f < mesh.faceCount() && everyFace; ++f) everyFace = mesh.face(f).size() == 3;

@@ -52,11 +52,19 @@ struct Mesh {
   bool isTriangles() const { return corners.size() == 3 * faceCount(); }
 };
 
+/// What every function that takes a mesh relies on: face starts begin at 0, never decrease and end at the
+/// number of corners; every corner is the index of a position; every attribute has `width` values for each
+/// position or corner; groups lie within the faces. Positions may be anything, faces of any length, also 0.
+/// Returns `mesh`, so that members can be made from what has been checked. Linear, cheap.
+/// @throws Error that says what is wrong, and with which face, attribute or group.
+const Mesh& requireValid(const Mesh& mesh);
+
 /// Box of the positions that faces use.
 Box boundingBox(const Mesh& mesh);
 
 /// The same surface with triangles only: polygons become fans from their first corner; attributes and groups
 /// follow. Faces with fewer than three corners are left out.
+/// @throws Error unless the mesh is valid.
 Mesh triangulated(const Mesh& mesh);
 
 /// For each position the lowest index of a position equal to it (-0 equals 0); itself where there is none

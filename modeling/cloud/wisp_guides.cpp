@@ -101,6 +101,7 @@ WispGuide blended(const std::array<WispGuide, 3>& g, const Vec3f& w) {
 
 std::vector<WispGuide> guidesOnVertices(const Mesh& mesh, const GuideOptions& options) {
   requireOptions(options);
+  requireValid(mesh);
   require(!mesh.positions.empty(), "guides: there are no vertices");
   const GuideAttributes attributes(mesh, options);
   std::vector<WispGuide> guides;

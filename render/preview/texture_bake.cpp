@@ -205,6 +205,8 @@ void grow(std::vector<Vec3f>& colours, std::vector<std::uint8_t>& isKnown, int w
 BakedTexture bakeTexture(const Mesh& reference, const Image& picture, const Mesh& object,
                          std::span<const Vec3d> images, const TextureBakeOptions& options,
                          const Progress& progress) {
+  requireValid(reference);
+  requireValid(object);
   for (const auto& [name, value, least] :
        {std::tuple{"width", options.width, 1}, std::tuple{"height", options.height, 1},
         std::tuple{"number of samples", options.samples, 1}, std::tuple{"gutter", options.gutter, 0}})

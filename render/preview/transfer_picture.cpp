@@ -27,6 +27,7 @@ Bounds boundsOf(const Mesh& mesh) {
 
 /// `mesh` turned, of unit size, on the ground, with `left` as the left end of it.
 SurfaceObject placed(const Mesh& mesh, const TransferPictureOptions& options, double& left) {
+  requireValid(mesh);
   require(mesh.faceCount() > 0, "picture of a transfer: a mesh has no faces");
   SurfaceObject object{.mesh = mesh};
   const double a = -double(options.azimuthDegrees) * M_PI / 180;

@@ -247,6 +247,7 @@ std::size_t Surfaces::memoryBytes() const {
 }
 
 double Surfaces::estimateBytes(const Mesh& mesh) {
+  requireValid(mesh);
   // Embree's two trees while they are built, and their triangles.
   constexpr double perTriangle = 400;
   const double triangles = double(mesh.corners.size()) - 2 * double(mesh.faceCount());

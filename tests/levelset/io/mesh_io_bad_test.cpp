@@ -90,6 +90,9 @@ TEST(MeshIoBad, FaultsAreNamedWithTheirLine) {
   const std::string v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   const Fault faults[] = {
       {"a.obj", v + "f 1 2 4\n", "line 4: vertex index 4 is out of range (the file has 3)"},
+      // Its negation is no 64-bit integer; the undefined-behaviour sanitizer stopped here.
+      {"a.obj", v + "f 1 2 -9223372036854775808\n",
+       "line 4: vertex index -9223372036854775808 is out of range (3 so far)"},
       {"a.obj", v + "f 1/1 2/1 3/1\n", "line 4: texture index 1 is out of range"},
       {"a.obj", v + "f 1 2 3x\n", "line 4: a face corner should look like"},
       {"a.obj", v + "f 1 2 99999999999999999999\n", "line 4: a vertex index should be a whole number"},

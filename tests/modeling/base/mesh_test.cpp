@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "nephele/modeling/base/error.h"
+
 namespace nephele {
 namespace {
 
@@ -13,6 +15,35 @@ Mesh cube() {
                                      {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   for (const auto& quad : quads) mesh.addFace(quad);
   return mesh;
+}
+
+TEST(Mesh, ValidityIsRequiredOfFacesCornersAttributesAndGroups) {
+  EXPECT_NO_THROW(requireValid(Mesh{}));
+  EXPECT_NO_THROW(requireValid(cube()));
+  const auto messageFor = [](void (*spoil)(Mesh&)) -> std::string {
+    Mesh mesh = cube();
+    spoil(mesh);
+    try {
+      requireValid(mesh);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(messageFor([](Mesh& m) { m.faceStart.clear(); }), "mesh: the first face must start at corner 0");
+  EXPECT_EQ(messageFor([](Mesh& m) { m.faceStart[2] = 3; }), "mesh: face 1 ends before it starts");
+  EXPECT_EQ(messageFor([](Mesh& m) { m.corners.pop_back(); }),
+            "mesh: the faces have 24 corners, but there are 23");
+  EXPECT_EQ(messageFor([](Mesh& m) { m.corners[5] = 8; }),
+            "mesh: corner 5 is at position 8, but there are 8 positions");
+  EXPECT_EQ(messageFor([](Mesh& m) {
+              m.attributes = {{"uv", MeshAttribute::Domain::corner, 2, {}}};
+            }),
+            "mesh: attribute 'uv' has 0 values for 24 corners, 2 each");
+  EXPECT_EQ(messageFor([](Mesh& m) {
+              m.groups = {{"all", 4, 3}};
+            }),
+            "mesh: group 'all' ends behind face 7, but there are 6 faces");
 }
 
 TEST(Mesh, UnitCubeHasVolumeOneAndAreaSix) {

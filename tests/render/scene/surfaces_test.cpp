@@ -46,6 +46,13 @@ RenderOptions with(std::vector<SurfaceObject> objects) {
 
 const Lights kSun{{{"sun", {0, 0, 1}, {3, 2, 1}}}, {}};
 
+TEST(Surfaces, MeshesThatAreNotValidAreRefused) {
+  Mesh broken = square(0);
+  broken.corners[2] = 4;
+  EXPECT_THROW(Surfaces::estimateBytes(broken), Error);
+  EXPECT_THROW(Surfaces({SurfaceObject{.mesh = broken}}), Error);
+}
+
 TEST(Surfaces, AreHitWhereTheyAre) {
   const Surfaces surfaces({{square(-2)}, {.mesh = square(-5), .isHoldout = true}});
   const auto hit = surfaces.hit({{0.3, 0.4, 7}, {0, 0, -1}});
