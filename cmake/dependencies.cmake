@@ -11,6 +11,8 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
   find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
   find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
   find_package(fmt REQUIRED)
+  # CGAL brings a find module for it that looks elsewhere.
+  find_package(OpenMesh CONFIG REQUIRED)
   find_package(ZLIB REQUIRED)
   find_library(BLOSC_LIBRARY blosc REQUIRED)
   find_package(nlohmann_json REQUIRED)

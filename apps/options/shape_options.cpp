@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 
 namespace nephele::apps {
@@ -17,7 +18,7 @@ Mesh ShapeArguments::shape(Run& run) const {
     run.begin("read");
     RepairedMesh read = readShape(input, repair, run);
     for (const std::string& note : read.repairs) run.note(note);
-    mesh = std::move(read.mesh);
+    mesh = subdividedAsAsked(std::move(read.mesh), subdivide, run);
   }
   if (!meshOutput.empty()) {
     writeMesh(meshOutput, mesh);
@@ -43,6 +44,7 @@ void addShapeOptions(CLI::App& app, ShapeArguments& a) {
   addOutput(app, "--shape-mesh", a.meshOutput, {".obj", ".ply", ".stl"},
             "Also write what the cloud grows on, before any layer.");
   addRepair(app, a.repair.mode);
+  addSubdivide(app, a.subdivide)->excludes(species);
 }
 
 }  // namespace nephele::apps

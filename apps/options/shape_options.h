@@ -15,6 +15,7 @@ struct ShapeArguments {
   int seed = 0;
   double size = 1;
   MeshRepairOptions repair;
+  int subdivide = 0;
 
   bool isGenerated() const { return species.has_value(); }
 

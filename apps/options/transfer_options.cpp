@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "apps/options/mesh_options.h"
+
 namespace nephele::apps {
 namespace {
 
@@ -109,6 +111,8 @@ void addTransferOptions(CLI::App& app, TransferArguments& a) {
       ->type_name("FILE");
   app.add_option("--to", a.to, "Object: the mesh that gets them.")->required()->type_name("FILE");
   addOutput(app, "-o,--output", a.output, {".obj", ".ply"}, "The object with the attributes.")->required();
+  addSubdivide(app, a.subdivide)
+      ->description("Split every triangle of the object in four this often and round it (Loop) first.");
   app.add_option_function<std::string>(
          "--attributes",
          [&a](const std::string& text) {

@@ -18,6 +18,8 @@ struct TransferArguments {
   TransferOptions transfer;
   MeshWarpOptions warp;
   int resolution = 256;
+  /// Of the object.
+  int subdivide = 0;
   std::string warpFile, warpedMesh;
   std::string texture, bakedTexture, preview;
   TextureBakeOptions bake;

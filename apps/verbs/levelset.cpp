@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/app.h"
+#include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
@@ -18,6 +19,7 @@ struct LevelsetOptions {
   int resolution = 256;
   MeshToLevelSetOptions conversion;
   MeshRepairOptions repair;
+  int subdivide = 0;
   const CLI::Option* voxelSizeOption = nullptr;
 };
 
@@ -35,14 +37,19 @@ void bindOptions(CLI::App& app, LevelsetOptions& options) {
   addNumber(app, "--half-width", options.conversion.halfWidthVoxels, 1, 1000,
             "Voxels on either side of the surface that hold distances.");
   addRepair(app, options.repair.mode);
+  addSubdivide(app, options.subdivide);
 }
 
 void convert(const LevelsetOptions& options, Run& run) {
   run.begin("read");
   const Mesh soup = readMesh(options.input);
   run.begin("repair");
-  const RepairedMesh repaired = repairMesh(soup, options.repair, run);
+  RepairedMesh repaired = repairMesh(soup, options.repair, run);
   for (const std::string& repair : repaired.repairs) run.note(repair);
+  if (options.subdivide > 0) {
+    repaired.mesh = subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run);
+    repaired.after = diagnose(repaired.mesh);
+  }
 
   MeshToLevelSetOptions conversion = options.conversion;
   const double longestSide = repaired.after.box.longestSide();

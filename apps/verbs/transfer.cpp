@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/app.h"
+#include "apps/options/mesh_options.h"
 #include "apps/options/transfer_options.h"
 #include "apps/transfer_report.h"
 #include "nephele/levelset/flow/advection_files.h"
@@ -42,9 +43,8 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
   run.begin("warp grid");
   // In units of the object again.
   const WarpBricks bricks(float(1 / warp.alignment.scale) * warp.object, box, {.voxelSize = voxelSize});
-  if (!arguments.warpFile.empty()) {
+  if (!arguments.warpFile.empty())
     writeVdbFile(arguments.warpFile, {toVdb(bricks.sample(warp.map, run), {.name = "rest"})}, run.metadata());
-  }
   if (arguments.warpedMesh.empty()) return;
   run.begin("warped mesh");
   const Mesh mesh = marchingCubes(*bricks.sample(compose(warp.reference, warp.map), run), 0.0f, run);
@@ -55,7 +55,8 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
 
 void transfer(const TransferArguments& arguments, Run& run) {
   run.begin("read");
-  const Mesh reference = readShape(arguments.from, run), object = readShape(arguments.to, run);
+  const Mesh reference = readShape(arguments.from, run);
+  const Mesh object = subdividedAsAsked(readShape(arguments.to, run), arguments.subdivide, run);
   const TransferOptions options = arguments.chosen(reference, object, run);
   const auto texture =
       arguments.texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(arguments.texture));
@@ -71,10 +72,10 @@ void transfer(const TransferArguments& arguments, Run& run) {
   writeWarp(arguments, reference, object, warpOptions, run);
   std::shared_ptr<const Image> baked;
   if (!arguments.bakedTexture.empty()) {
-    const BakedTexture bakedTexture =
+    const BakedTexture bake =
         bakeTexture(reference, *texture, object, warp.images, arguments.bakeOptions(*texture), run);
-    run.stats["texels_covered"] = bakedTexture.covered;
-    baked = std::make_shared<const Image>(bakedTexture.image);
+    run.stats["texels_covered"] = bake.covered;
+    baked = std::make_shared<const Image>(bake.image);
     writePng(arguments.bakedTexture, *baked, {.shoulder = 0.99999f}, run.metadata());
   }
   if (!arguments.preview.empty())

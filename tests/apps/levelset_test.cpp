@@ -65,6 +65,14 @@ TEST_F(LevelsetVerb, VoxelSizeMayBeAShareOfTheLongestSide) {
   EXPECT_NEAR(jsonOf(stats_).at("grid").at("voxel_size").get<double>(), 0.04, 1e-3);
 }
 
+TEST_F(LevelsetVerb, CoarseCagesAreSubdivided) {
+  writeMesh(mesh_, icosphere(1.0, 1));
+  ASSERT_EQ(run("--resolution 40 --subdivide 2").exitCode, 0);
+  EXPECT_EQ(jsonOf(stats_).at("mesh").at("triangles"), 80 * 16);
+  // Loop's surface lies within its cage.
+  EXPECT_LT(jsonOf(stats_).at("mesh").at("volume").get<double>(), signedVolume(icosphere(1.0, 1)));
+}
+
 TEST_F(LevelsetVerb, SameCommandSameGrid) {
   const auto bricksOf = [&](const std::string& options) {
     EXPECT_EQ(run(options).exitCode, 0);

@@ -1,6 +1,7 @@
 // The verb mesh, through the program.
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "nephele/levelset/io/mesh_io.h"
@@ -138,13 +139,95 @@ TEST_F(MeshVerb, NamesTheGridsThatAreThereWhereTheNameIsWrong) {
   EXPECT_NE(result.errors.find("surface"), std::string::npos) << result.errors;
 }
 
-TEST_F(MeshVerb, RefusesAFileThatIsNotAVolume) {
+TEST_F(MeshVerb, RefusesAFileThatIsNoVolumeAndNoMesh) {
   const TemporaryFolder folder;
+  std::ofstream(folder.file("shopping.txt")) << "milk\n";
   const ProgramResult result =
-      runProgram("mesh " + ownData("data/sphere_uv.obj") + " -o " + folder.file("out.obj"));
+      runProgram("mesh " + folder.file("shopping.txt") + " -o " + folder.file("out.obj"));
   EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find("sphere_uv.obj"), std::string::npos) << result.errors;
-  EXPECT_EQ(folder.entryCount(), 0u);
+  EXPECT_NE(result.errors.find("shopping.txt: unknown mesh format"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+TEST_F(MeshVerb, DecimatesToANumberOfFacesOrADistance) {
+  const TemporaryFolder folder;
+  const nlohmann::json few = statsOf(levelSet() + " --faces 1000 -o " + folder.file("few.obj"));
+  const Mesh mesh = readMesh(folder.file("few.obj"));
+  EXPECT_LE(mesh.faceCount(), 1000u);
+  EXPECT_GE(mesh.faceCount(), 998u);
+  const Topology topology = topologyOf(mesh);
+  EXPECT_TRUE(topology.isClosedManifold()) << topology;
+  EXPECT_EQ(topology.components, 2u);
+  EXPECT_EQ(topology.eulerCharacteristic, 0);
+  EXPECT_EQ(few["faces"], mesh.faceCount());
+
+  // A percentage is of the longest side: the same as the length that it is.
+  const double side = boundingBox(mesh).longestSide();
+  const nlohmann::json share = statsOf(levelSet() + " --max-error 1% -o " + folder.file("a.ply"));
+  const nlohmann::json world =
+      statsOf(levelSet() + " --max-error " + std::to_string(0.01 * side) + " -o " + folder.file("b.ply"));
+  EXPECT_NEAR(share["faces"].get<double>() / world["faces"].get<double>(), 1, 0.05);
+  EXPECT_LT(share["faces"], statsOf(levelSet() + " -o " + folder.file("c.ply"))["faces"]);
+}
+
+TEST_F(MeshVerb, ProcessesMeshesToo) {
+  const TemporaryFolder folder;
+  const std::string ball = ownData("data/sphere_uv.obj");
+  const Mesh before = readMesh(ball);
+  ASSERT_EQ(runProgram("mesh " + ball + " --subdivide 1 --smooth 3 -o " + folder.file("out.obj")).exitCode,
+            0);
+  const Mesh after = readMesh(folder.file("out.obj"));
+  EXPECT_EQ(after.faceCount(), 4 * triangulated(before).faceCount());
+  ASSERT_EQ(after.attributes.size(), 1u);
+  EXPECT_EQ(after.attributes[0].name, "uv");
+  // With nothing to do it changes the format.
+  ASSERT_EQ(runProgram("mesh " + ball + " -o " + folder.file("same.ply")).exitCode, 0);
+  EXPECT_EQ(readMesh(folder.file("same.ply")).corners, before.corners);
+}
+
+TEST_F(MeshVerb, CagesOfCloudAndTransferAreSubdivided) {
+  const TemporaryFolder folder;
+  const std::string cage = ownData("data/sphere_uv.obj");
+  const std::size_t triangles = triangulated(readMesh(cage)).faceCount();
+  const ProgramResult cloud =
+      runProgram("cloud " + cage + " --subdivide 1 --resolution 24 --layers 1 -o " +
+                 folder.file("cloud.vdb") + " --shape-mesh " + folder.file("shape.ply"));
+  ASSERT_EQ(cloud.exitCode, 0) << cloud.errors;
+  EXPECT_EQ(readMesh(folder.file("shape.ply")).faceCount(), 4 * triangles);
+  const ProgramResult carried =
+      runProgram("transfer --from " + cage + " --to " + cage +
+                 " --subdivide 1 --method closest --align none -o " + folder.file("carried.obj"));
+  ASSERT_EQ(carried.exitCode, 0) << carried.errors;
+  EXPECT_EQ(readMesh(folder.file("carried.obj")).faceCount(), 4 * triangles);
+}
+
+TEST_F(MeshVerb, SaysWhatCannotBeDecimated) {
+  const TemporaryFolder folder;
+  const std::string to = " -o " + folder.file("out.obj");
+  // Three triangles on one edge.
+  std::ofstream(folder.file("edge.obj"))
+      << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 -1\nf 1 2 3\nf 1 2 4\nf 2 1 5\n";
+  const ProgramResult complexEdge = runProgram("mesh " + folder.file("edge.obj") + " --faces 2" + to);
+  EXPECT_EQ(complexEdge.exitCode, 1);
+  EXPECT_NE(complexEdge.errors.find("1 edge with more than two faces"), std::string::npos)
+      << complexEdge.errors;
+  const ProgramResult none = runProgram("mesh " + levelSet() + " --faces 0" + to);
+  EXPECT_EQ(none.exitCode, 2);
+  EXPECT_NE(none.errors.find("--faces"), std::string::npos) << none.errors;
+  // Two tori cannot be made of two triangles.
+  const ProgramResult tooFew = runProgram("mesh " + levelSet() + " --faces 2" + to);
+  EXPECT_EQ(tooFew.exitCode, 1);
+  EXPECT_NE(tooFew.errors.find("cannot have 2 faces"), std::string::npos) << tooFew.errors;
+  const ProgramResult forVolumes = runProgram("mesh " + folder.file("edge.obj") + " --isovalue 1" + to);
+  EXPECT_EQ(forVolumes.exitCode, 2);
+  EXPECT_NE(forVolumes.errors.find("--isovalue"), std::string::npos) << forVolumes.errors;
+  EXPECT_EQ(folder.entryCount(), 1u);
+
+  // More faces than there are: the mesh as it is, and a word about it.
+  const ProgramResult more = runProgram("mesh " + folder.file("edge.obj") + " --faces 4" + to);
+  EXPECT_EQ(more.exitCode, 0);
+  EXPECT_NE(more.errors.find("has 3 triangles, no more than --faces 4"), std::string::npos) << more.errors;
+  EXPECT_EQ(readMesh(folder.file("out.obj")).faceCount(), 3u);
 }
 
 }  // namespace
