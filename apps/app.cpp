@@ -8,8 +8,8 @@
 #include <iostream>
 #include <new>
 
+#include "apps/detail/program_run.h"
 #include "apps/options/config_file.h"
-#include "apps/program_run.h"
 #include "nephele/levelset/io/output_file.h"
 
 namespace nephele::apps {

@@ -2,8 +2,10 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/options/options.h"
@@ -53,6 +55,19 @@ struct Verb {
   /// What --help says between the options and the example.
   std::string notes{};
 };
+
+/// A verb whose body works on the options that were bound.
+template <class Options>
+Verb verbOf(std::string name, std::string summary, std::string example, void (*bind)(CLI::App&, Options&),
+            void (*body)(const Options&, Run&), std::string notes = {}) {
+  const auto options = std::make_shared<Options>();
+  return {std::move(name),
+          std::move(summary),
+          std::move(example),
+          [=](CLI::App& app) { bind(app, *options); },
+          [=](Run& run) { body(*options, run); },
+          std::move(notes)};
+}
 
 Verb levelsetVerb();
 Verb cloudVerb();

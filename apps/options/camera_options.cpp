@@ -99,19 +99,12 @@ void addLens(CLI::App& app, CameraOptions& options) {
 }
 
 void addTime(CLI::App& app, CameraOptions& options) {
-  app.add_option_function<std::string>(
-         "--shutter",
-         [&options](const std::string& text) {
-           const std::string form = "OPEN,CLOSE in frames, each -100 to 100, OPEN not after CLOSE";
-           const std::vector<double> n = parseNumbers("--shutter", text, form);
-           if (n.size() != 2 || n[0] > n[1] || n[0] < -100 || n[1] > 100)
-             refuseValue("--shutter", text, form);
-           options.shutter = {n[0], n[1]};
-         },
-         "When the shutter opens and closes, in frames from the frame: -0.25,0.25 is the usual blur, 0,0 "
-         "none.")
-      ->type_name("OPEN,CLOSE")
-      ->default_str("0,0");
+  addShutter(
+      app, "frames",
+      [&options](double open, double close) {
+        options.shutter = {open, close};
+      },
+      "When the shutter opens and closes, in frames from the frame: -0.25,0.25 is the usual blur, 0,0 none.");
   app.add_option_function<std::string>(
          "--volume-motion",
          [&options](const std::string& text) {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/app.h"
-#include "apps/cloud_advection.h"
+#include "apps/options/cloud_advection.h"
 #include "apps/options/cloud_quantities.h"
 #include "apps/options/density_options.h"
 #include "apps/options/layer_recipe.h"

@@ -133,6 +133,22 @@ CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::strin
       ->type_name(form);
 }
 
+void addShutter(CLI::App& app, const std::string& unit, const std::function<void(double, double)>& set,
+                const std::string& description) {
+  app.add_option_function<std::string>(
+         "--shutter",
+         [=](const std::string& text) {
+           const std::string form = "OPEN,CLOSE in " + unit + ", each -100 to 100, OPEN not after CLOSE";
+           const std::vector<double> n = parseNumbers("--shutter", text, form);
+           if (n.size() != 2 || n[0] > n[1] || n[0] < -100 || n[1] > 100)
+             refuseValue("--shutter", text, form);
+           set(n[0], n[1]);
+         },
+         description)
+      ->type_name("OPEN,CLOSE")
+      ->default_str("0,0");
+}
+
 CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int low, int high,
                       const std::string& description) {
   const std::string allowed = high < std::numeric_limits<int>::max()

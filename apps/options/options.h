@@ -60,6 +60,9 @@ CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<d
 CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
                         double low, double high, const std::function<void(const Vec3f&)>& set,
                         const std::string& description);
+/// --shutter OPEN,CLOSE, two times of which the first is not the later; `unit` is what they count.
+void addShutter(CLI::App& app, const std::string& unit, const std::function<void(double, double)>& set,
+                const std::string& description);
 CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int low, int high,
                       const std::string& description);
 /// One of a few words, each standing for a value.

@@ -202,19 +202,10 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
   app.add_option("--velocity-grid", a.velocityGrid,
                  "Grid of the velocity file; default: v, vel, velocity, or the only one of vectors.")
       ->type_name("NAME");
-  app.add_option_function<std::string>(
-         "--shutter",
-         [&a](const std::string& text) {
-           const std::string form = "OPEN,CLOSE in units of time, each -100 to 100, OPEN not after CLOSE";
-           const std::vector<double> n = parseNumbers("--shutter", text, form);
-           if (n.size() != 2 || n[0] > n[1] || n[0] < -100 || n[1] > 100)
-             refuseValue("--shutter", text, form);
-           a.shutterOpen = float(n[0]);
-           a.shutterClose = float(n[1]);
-         },
-         "Smear dots along their velocity, from when the shutter opens to when it closes.")
-      ->type_name("OPEN,CLOSE")
-      ->default_str("0,0");
+  addShutter(
+      app, "units of time",
+      [&a](double open, double close) { a.shutterOpen = float(open), a.shutterClose = float(close); },
+      "Smear dots along their velocity, from when the shutter opens to when it closes.");
   addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another set of guides and wisps.");
   app.add_flag("--half", a.halfFloat, "Write half floats.");
 }

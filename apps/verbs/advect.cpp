@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/advect_options.h"
 #include "nephele/levelset/flow/advection_files.h"
@@ -60,11 +58,10 @@ void carry(const AdvectArguments& arguments, Run& run) {
 }  // namespace
 
 Verb advectVerb() {
-  const auto arguments = std::make_shared<AdvectArguments>();
-  return {"advect", "Carries the grids of a volume along with a velocity.",
-          "nephele advect cloud.vdb -o wisps.vdb --velocity curl:amplitude=0.3%,frequency=8x --steps 12",
-          [arguments](CLI::App& app) { addAdvectOptions(app, *arguments); },
-          [arguments](Run& run) { carry(*arguments, run); }};
+  return verbOf(
+      "advect", "Carries the grids of a volume along with a velocity.",
+      "nephele advect cloud.vdb -o wisps.vdb --velocity curl:amplitude=0.3%,frequency=8x --steps 12",
+      addAdvectOptions, carry);
 }
 
 }  // namespace nephele::apps

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/cloud_options.h"
 
@@ -87,13 +85,9 @@ void growCloud(const CloudArguments& arguments, Run& run) {
 }  // namespace
 
 Verb cloudVerb() {
-  const auto arguments = std::make_shared<CloudArguments>();
-  return {"cloud",
-          "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
-          "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x",
-          [arguments](CLI::App& app) { addCloudOptions(app, *arguments); },
-          [arguments](Run& run) { growCloud(*arguments, run); },
-          fieldValueHelp()};
+  return verbOf("cloud", "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
+                "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x", addCloudOptions,
+                growCloud, fieldValueHelp());
 }
 
 }  // namespace nephele::apps

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <future>
-#include <memory>
 
 #include "apps/app.h"
 #include "apps/cut_report.h"
@@ -62,11 +61,9 @@ void cut(const CutArguments& arguments, Run& run) {
 }  // namespace
 
 Verb cutVerb() {
-  const auto arguments = std::make_shared<CutArguments>();
-  return {"cut", "Cuts a model into closed pieces by knives.",
-          "nephele cut bunny.obj -o pieces --random-planes 5 --explode 0.4 --preview pieces.png",
-          [arguments](CLI::App& app) { addCutOptions(app, *arguments); },
-          [arguments](Run& run) { cut(*arguments, run); }};
+  return verbOf("cut", "Cuts a model into closed pieces by knives.",
+                "nephele cut bunny.obj -o pieces --random-planes 5 --explode 0.4 --preview pieces.png",
+                addCutOptions, cut);
 }
 
 }  // namespace nephele::apps

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/descriptions.h"
 
@@ -63,21 +61,19 @@ void describeFiles(const InfoOptions& options, Run& run) {
   require(errors.empty(), errors);
 }
 
+void bindOptions(CLI::App& app, InfoOptions& options) {
+  app.add_option("files", options.files, "Meshes, volumes (.vdb, .nvdb), images (.exr, .png, .hdr).")
+      ->required()
+      ->type_name("FILE");
+  app.add_flag("--self-intersections", options.selfIntersections,
+               "Count intersecting triangles also where a mesh has more than 500 000 triangles.");
+}
+
 }  // namespace
 
 Verb infoVerb() {
-  const auto options = std::make_shared<InfoOptions>();
-  return {"info", "Says what is in meshes, volumes and images, and what is wrong with them.",
-          "nephele info bunny.obj cloud.vdb picture.exr",
-          [options](CLI::App& app) {
-            app.add_option("files", options->files,
-                           "Meshes, volumes (.vdb, .nvdb), images (.exr, .png, .hdr).")
-                ->required()
-                ->type_name("FILE");
-            app.add_flag("--self-intersections", options->selfIntersections,
-                         "Count intersecting triangles also where a mesh has more than 500 000 triangles.");
-          },
-          [options](Run& run) { describeFiles(*options, run); }};
+  return verbOf("info", "Says what is in meshes, volumes and images, and what is wrong with them.",
+                "nephele info bunny.obj cloud.vdb picture.exr", bindOptions, describeFiles);
 }
 
 }  // namespace nephele::apps

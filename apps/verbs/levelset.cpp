@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -81,11 +79,8 @@ void convert(const LevelsetOptions& options, Run& run) {
 }  // namespace
 
 Verb levelsetVerb() {
-  const auto options = std::make_shared<LevelsetOptions>();
-  return {"levelset", "Turns a closed mesh into a signed distance volume.",
-          "nephele levelset bunny.obj -o bunny.vdb --resolution 512",
-          [options](CLI::App& app) { bindOptions(app, *options); },
-          [options](Run& run) { convert(*options, run); }};
+  return verbOf("levelset", "Turns a closed mesh into a signed distance volume.",
+                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", bindOptions, convert);
 }
 
 }  // namespace nephele::apps

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/isosurface_options.h"
 #include "apps/options/mesh_options.h"
@@ -57,11 +55,8 @@ void makeMesh(const MeshOptions& options, Run& run) {
 }  // namespace
 
 Verb meshVerb() {
-  const auto options = std::make_shared<MeshOptions>();
-  return {"mesh", "Turns a level set or a density into a mesh, or decimates, smooths and subdivides one.",
-          "nephele mesh surface.vdb -o surface.obj --faces 20000",
-          [options](CLI::App& app) { bindOptions(app, *options); },
-          [options](Run& run) { makeMesh(*options, run); }};
+  return verbOf("mesh", "Turns a level set or a density into a mesh, or decimates, smooths and subdivides one.",
+                "nephele mesh surface.vdb -o surface.obj --faces 20000", bindOptions, makeMesh);
 }
 
 }  // namespace nephele::apps

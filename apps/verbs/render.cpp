@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/options/object_options.h"
 #include "apps/options/render_options.h"
 #include "nephele/render/image/exr_io.h"
@@ -89,11 +87,9 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
 }  // namespace
 
 Verb renderVerb() {
-  const auto options = std::make_shared<RenderVerbOptions>();
-  return {"render", "Makes a picture of a density: a cloud, smoke, any fog volume.",
-          "nephele render cloud.vdb -o cloud.exr --preview cloud.png --view 25,5 --sun 90,38",
-          [options](CLI::App& app) { bindOptions(app, *options); },
-          [options](Run& run) { renderVolume(*options, run); }};
+  return verbOf("render", "Makes a picture of a density: a cloud, smoke, any fog volume.",
+                "nephele render cloud.vdb -o cloud.exr --preview cloud.png --view 25,5 --sun 90,38",
+                bindOptions, renderVolume);
 }
 
 }  // namespace nephele::apps

@@ -5,7 +5,7 @@
 #include "apps/app.h"
 #include "apps/options/mesh_options.h"
 #include "apps/options/transfer_options.h"
-#include "apps/transfer_report.h"
+#include "apps/verbs/detail/transfer_report.h"
 #include "nephele/levelset/flow/advection_files.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
@@ -89,11 +89,9 @@ void transfer(const TransferArguments& arguments, Run& run) {
 }  // namespace
 
 Verb transferVerb() {
-  const auto arguments = std::make_shared<TransferArguments>();
-  return {"transfer", "Carries texture coordinates and other attributes from one mesh to another.",
-          "nephele transfer --from sphere.obj --to bunny.obj -o bunny_uv.obj --preview bunny.png",
-          [arguments](CLI::App& app) { addTransferOptions(app, *arguments); },
-          [arguments](Run& run) { transfer(*arguments, run); }};
+  return verbOf("transfer", "Carries texture coordinates and other attributes from one mesh to another.",
+                "nephele transfer --from sphere.obj --to bunny.obj -o bunny_uv.obj --preview bunny.png",
+                addTransferOptions, transfer);
 }
 
 }  // namespace nephele::apps

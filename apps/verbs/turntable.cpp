@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 
-#include "apps/turntable_plan.h"
+#include "apps/verbs/detail/turntable_plan.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
@@ -89,11 +88,9 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
 }  // namespace
 
 Verb turntableVerb() {
-  const auto options = std::make_shared<TurntableOptions>();
-  return {"turntable", "Makes the frames of a turn around a density, and a movie of them.",
-          "nephele turntable cloud.vdb -o frames/cloud.####.exr --frames 1-48 --movie cloud.mp4",
-          [options](CLI::App& app) { bindOptions(app, *options); },
-          [options](Run& run) { makeTurntable(*options, run); }};
+  return verbOf("turntable", "Makes the frames of a turn around a density, and a movie of them.",
+                "nephele turntable cloud.vdb -o frames/cloud.####.exr --frames 1-48 --movie cloud.mp4",
+                bindOptions, makeTurntable);
 }
 
 }  // namespace nephele::apps

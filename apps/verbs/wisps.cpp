@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/app.h"
 #include "apps/options/wisps_options.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -61,11 +59,9 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
 }  // namespace
 
 Verb wispsVerb() {
-  const auto arguments = std::make_shared<WispsArguments>();
-  return {"wisps", "Grows wisps of fine dots on guide particles.",
-          "nephele wisps particles.ply -o wisps.vdb --size 5% --dots 50000",
-          [arguments](CLI::App& app) { addWispsOptions(app, *arguments); },
-          [arguments](Run& run) { makeWisps(*arguments, run); }};
+  return verbOf("wisps", "Grows wisps of fine dots on guide particles.",
+                "nephele wisps particles.ply -o wisps.vdb --size 5% --dots 50000", addWispsOptions,
+                makeWisps);
 }
 
 }  // namespace nephele::apps

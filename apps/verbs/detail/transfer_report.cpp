@@ -1,4 +1,4 @@
-#include "apps/transfer_report.h"
+#include "apps/verbs/detail/transfer_report.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "apps/program_run.h"
+#include "apps/detail/program_run.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "apps/cloud_advection.h"
+#include "apps/options/cloud_advection.h"
 
 #include "apps/options/velocity_options.h"
 #include "nephele/levelset/flow/advection.h"
