@@ -72,6 +72,7 @@ void ContactSheet::set(int place, const Image& frame) {
   require(frame.width == frameWidth_ && frame.height == frameHeight_,
           fmt::format("contact sheet: expected a frame of {}x{}, got {}x{}", frameWidth_, frameHeight_,
                       frame.width, frame.height));
+  frame.check();
   const int left = gap_ + place % columns_ * (cellWidth_ + gap_),
             top = gap_ + place / columns_ * (cellHeight_ + gap_);
   for (std::size_t c = 0; c != std::size(kNames); ++c) {

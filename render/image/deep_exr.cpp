@@ -33,7 +33,7 @@ void writeDeepExr(const std::string& path, const DeepImage& image, const ImageCa
 
 void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageCamera& camera,
                   const std::map<std::string, std::string>& metadata) {
-  require(image.width > 0 && image.height > 0, "deep exr: the image is empty");
+  image.check();
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
   // In deep files `version` is a number of OpenEXR's own.
   std::map<std::string, std::string> attributes = metadata;

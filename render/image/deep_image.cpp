@@ -1,11 +1,21 @@
 #include "nephele/render/image/deep_image.h"
 
+#include <fmt/format.h>
+
+#include "nephele/modeling/base/error.h"
+
 namespace nephele {
 
 std::size_t DeepImage::sampleCount() const {
   std::size_t count = 0;
   for (const auto& pixel : pixels) count += pixel.size();
   return count;
+}
+
+void DeepImage::check() const {
+  require(width > 0 && height > 0 && pixels.size() == std::size_t(width) * std::size_t(height),
+          fmt::format("deep image: has {} lists of samples, but its size is {}x{}", pixels.size(), width,
+                      height));
 }
 
 FlatPixel flattened(const std::vector<DeepSample>& samples) {

@@ -28,6 +28,8 @@ struct DeepImage {
 
   const std::vector<DeepSample>& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
   std::size_t sampleCount() const;
+  /// @throws Error unless there is a list for each of width * height pixels, and one at least.
+  void check() const;
 };
 
 /// Front to back: what the samples of a pixel look like together; colour and, last, opacity.

@@ -131,7 +131,8 @@ void writeExr(const std::string& path, const Image& image, const ImageCamera& ca
 
 void writeExr(const OutputFile& output, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
-  require(image.width > 0 && image.height > 0 && !image.channels.empty(), "exr: the image is empty");
+  image.check();
+  require(!image.channels.empty(), "exr: the image has no channels");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
   Imf::Header header = detail::exrHeader(image.width, image.height, image.display, camera, metadata);
 

@@ -1,5 +1,7 @@
 #include "nephele/render/image/image.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
@@ -31,6 +33,14 @@ const Image::Channel& Image::channel(const std::string& name) const {
   return *channel;
 }
 
+void Image::check() const {
+  require(width > 0 && height > 0, fmt::format("image: has no pixels, its size is {}x{}", width, height));
+  for (const Channel& channel : channels)
+    require(channel.values.size() == std::size_t(width) * std::size_t(height),
+            fmt::format("image: the channel {} has {} values, but the size is {}x{}", channel.name,
+                        channel.values.size(), width, height));
+}
+
 namespace {
 
 float onScreen(float linear, float shoulder) {
@@ -51,6 +61,7 @@ float dither(std::size_t x, std::size_t y) {
 }  // namespace
 
 std::vector<float> displayed(const Image& image, const ViewTransform& view) {
+  image.check();
   require(view.shoulder >= 0 && view.shoulder < 1, "view transform: shoulder must be within [0, 1)");
   const std::vector<float>& alpha = image.channel("A").values;
   const std::vector<float>* colour[] = {&image.channel("R").values, &image.channel("G").values,

@@ -43,6 +43,9 @@ struct Image {
   const Channel* find(const std::string& name) const;
   /// @throws Error naming the channel if it is not there.
   const Channel& channel(const std::string& name) const;
+  /// What writes or shows images begins with this. @throws Error naming what is wrong unless there are pixels
+  /// and every channel has width * height values.
+  void check() const;
   float at(const std::string& name, int x, int y) const {
     return channel(name).values[std::size_t(y) * width + x];
   }
@@ -60,7 +63,7 @@ struct ViewTransform {
 };
 
 /// Screen values in [0, 1], three per pixel, of R, G, B and A of `image`. @throws Error if one of them is
-/// missing.
+/// missing, or as Image::check does.
 std::vector<float> displayed(const Image& image, const ViewTransform& view);
 
 /// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands

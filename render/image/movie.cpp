@@ -126,7 +126,7 @@ MovieWriter::MovieWriter(const std::string& path, int width, int height, const O
   if (error != 0) process_->id = -1;
   require(error != ENOENT,
           fmt::format("{}: movies are made by the program '{}', which is not installed; install the package "
-                      "ffmpeg or leave --movie out",
+                      "ffmpeg, or make no movie",
                       path, options.program));
   require(error == 0, fmt::format("{}: the program '{}' cannot be started: {}", path, options.program,
                                   std::generic_category().message(error)));

@@ -28,21 +28,23 @@ using File = std::unique_ptr<std::FILE, CloseFile>;
 }
 void ignore(png_structp, png_const_charp) {}
 
-struct Writer {
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore);
-  png_infop info = png_create_info_struct(png);
-  Writer() = default;
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
+// What libpng holds of a file.
+struct Handle {
+  explicit Handle(png_structp made) : png(made), info(png_create_info_struct(made)) {}
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+
+  png_structp png;
+  png_infop info;
+};
+
+struct Writer : Handle {
+  Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {}
   ~Writer() { png_destroy_write_struct(&png, &info); }
 };
 
-struct Reader {
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore);
-  png_infop info = png_create_info_struct(png);
-  Reader() = default;
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+struct Reader : Handle {
+  Reader() : Handle(png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {}
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 

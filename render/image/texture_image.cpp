@@ -41,7 +41,7 @@ Image readTexture(const std::string& path) {
 }
 
 Texture::Texture(const Image& image) {
-  require(image.width > 0 && image.height > 0, "texture: the picture is empty");
+  image.check();
   const std::vector<float>&r = image.channel("R").values, &g = image.channel("G").values,
         &b = image.channel("B").values;
   Level first{image.width, image.height, {}};

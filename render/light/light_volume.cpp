@@ -214,13 +214,7 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
   detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
   Patch patches[2];
   Patch *here = &patches[0], *next = &patches[1];
-  for (int n = 0; n != brickCount_.z;) {
-    if (!poolAt(n)) {
-      ++n;
-      continue;
-    }
-    int end = n;
-    while (end != brickCount_.z && poolAt(end)) ++end;
+  detail::forEachFilledRun(brickCount_.z, poolAt, [&](int n, int end) {
     // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
     const int slices = (end - n) * kBrick;
     int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
@@ -250,8 +244,7 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
       std::swap(at.density, at.next);
       std::swap(here, next);
     }
-    n = end;
-  }
+  });
 }
 
 // Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of

@@ -22,6 +22,7 @@
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/light/detail/light_slices.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/scene/sub_samples.h"
 
@@ -118,13 +119,7 @@ struct ProjectedLightVolume::Sweep {
       return face.table[std::size_t(n) * std::size_t(count.x) * std::size_t(count.y) + column];
     };
     Nodes sum{}, before{}, after{}, here{}, half{}, next{};
-    for (int n = 0; n != count.z;) {
-      if (!poolAt(n)) {
-        ++n;
-        continue;
-      }
-      int end = n;
-      while (end != count.z && poolAt(end)) ++end;
+    detail::forEachFilledRun(count.z, poolAt, [&](int n, int end) {
       const int slices = (end - n) * kBrick, k0 = (first.z + n) * kBrick;
       before.fill(0.0f);
       densities(k0, here);
@@ -143,8 +138,7 @@ struct ProjectedLightVolume::Sweep {
         for (std::size_t m = 0; m != kArea; ++m) sum[m] += after[m];
         std::swap(before, after);
       }
-      n = end;
-    }
+    });
   }
 
   void store(std::int32_t pool, int inside, const Nodes& sum, const Nodes& before, const Nodes& after) {

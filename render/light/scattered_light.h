@@ -54,7 +54,8 @@ class ScatteredLight {
   };
 
   /// Light of a sun whose column densities are `sun`, or of a sky of radiance 1 if that is null.
-  /// Cost: some 8 sweeps, each directions * nodes. @throws Error if an option is too small to be useful.
+  /// Cost: some 8 sweeps, each directions * nodes. @throws Error if an option is too small to be useful or
+  /// `scattering` is outside its range.
   ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const LightVolume* sun,
                  const Progress& progress = silent());
   ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const LightVolume* sun,

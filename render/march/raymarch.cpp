@@ -35,16 +35,7 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 }
 
 void check(const Medium& medium, const Lights& lights, const Octaves& octaves) {
-  require(std::isfinite(medium.extinction) && medium.extinction >= 0,
-          fmt::format("extinction: expected a finite number >= 0, got {}", medium.extinction));
-  for (int c = 0; c != 3; ++c) {
-    require(medium.albedo[c] >= 0 && medium.albedo[c] <= 1,
-            fmt::format("albedo: expected three numbers within [0, 1], got {}", medium.albedo[c]));
-  }
-  for (int c = 0; c != 3; ++c)
-    require(std::isfinite(medium.extinctionColour[c]) && medium.extinctionColour[c] >= 0,
-            fmt::format("extinction colour: expected three finite numbers >= 0, got {}",
-                        medium.extinctionColour[c]));
+  medium.check();
   lights.check();
   require(octaves.count >= 1 && octaves.count <= MarchScene::kMostOctaves,
           fmt::format("octaves: expected 1 to {}, got {}", MarchScene::kMostOctaves, octaves.count));

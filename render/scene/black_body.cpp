@@ -69,4 +69,12 @@ Vec3f blackBody(double kelvin) {
           float(std::max(0.0, 0.0557 * c.x - 0.2040 * c.y + 1.0570 * c.z))};
 }
 
+BlackBodyColours::BlackBodyColours(float hottest) : perKelvin_(float(kSteps) / std::max(hottest, 1.0f)) {
+  if (hottest <= 0) {
+    table_.resize(kSteps + 2);
+    return;
+  }
+  for (int i = 0; i <= kSteps + 1; ++i) table_.push_back(blackBody(double(i) / double(perKelvin_)));
+}
+
 }  // namespace nephele

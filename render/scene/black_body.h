@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "nephele/modeling/base/math.h"
 
 namespace nephele {
@@ -12,5 +15,21 @@ Vec3d blackBodyXyz(double kelvin);
 /// third of it, 1000 K six millionths, 3000 K 65 times as much. Colours outside of Rec.709 (below 1900 K,
 /// where blue is negative) have those channels at 0. 0 at 0 K and below. Cost: some 80 exponentials.
 Vec3f blackBody(double kelvin);
+
+/// Colours of all black bodies between 0 K and `hottest`, from a table; those beyond count as the nearest.
+class BlackBodyColours {
+ public:
+  explicit BlackBodyColours(float hottest);
+  Vec3f operator()(float kelvin) const {
+    const float x = std::clamp(kelvin * perKelvin_, 0.0f, float(kSteps));
+    const int i = int(x);
+    return table_[std::size_t(i)] + (table_[std::size_t(i + 1)] - table_[std::size_t(i)]) * (x - float(i));
+  }
+
+ private:
+  static constexpr int kSteps = 4096;
+  float perKelvin_;
+  std::vector<Vec3f> table_;
+};
 
 }  // namespace nephele

@@ -62,6 +62,7 @@ Holdout::Holdout(const DeepImage& image)
     : display_(image.display.value_or(Image::Display{0, 0, image.width, image.height})),
       width_(image.width),
       height_(image.height) {
+  image.check();
   std::vector<Change> changes;
   start_.reserve(image.pixels.size() + 1);
   for (const auto& samples : image.pixels) {

@@ -18,7 +18,8 @@ namespace nephele {
 /// the picture of both, opacity included.
 class Holdout {
  public:
-  /// From samples that need not be sorted or apart from each other: transmittances multiply.
+  /// From samples that need not be sorted or apart from each other: transmittances multiply. @throws Error
+  /// as DeepImage::check does.
   explicit Holdout(const DeepImage& image);
 
   /// At the pixel (x, y) of the whole picture; nothing is held out outside the image.

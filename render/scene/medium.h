@@ -14,6 +14,9 @@ struct Medium {
   /// Multiplies the extinction, per colour, >= 0: what is left of white light behind a volume is brighter
   /// where it is smaller.
   Vec3f extinctionColour{1, 1, 1};
+
+  /// @throws Error if a number is outside its range.
+  void check() const;
 };
 
 /// Multiple scattering: what the marcher takes for it.

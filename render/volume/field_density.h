@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/field/field.h"
@@ -21,6 +22,8 @@ class FieldDensity {
  public:
   /// Cells along each edge of a brick.
   static constexpr int kBrick = 8;
+  /// Larger densities count as this: opaque at any extinction, and far from overflow.
+  static constexpr float kMostDensity = 1e30f;
 
   /// Cost: ranges of the field over all cells that are neither empty nor constant, some microseconds each on
   /// all cores, and 1 kB per brick of 8^3 of them. The result does not depend on the number of threads.
@@ -101,6 +104,9 @@ class FieldDensity {
   };
 
  private:
+  // Share of a cell by which points may lie outside of the part that they are counted to.
+  static constexpr float kMargin = 0.02f;
+
   using Codes = std::array<std::uint8_t, 2>;
   struct Cells {
     std::array<Codes, kBrick * kBrick * kBrick> codes{};
@@ -108,10 +114,7 @@ class FieldDensity {
   };
   struct Build;
 
-  std::size_t entryOf(const Vec3i& brick) const {
-    return (std::size_t(brick.z) * std::size_t(bricks_.y) + std::size_t(brick.y)) * std::size_t(bricks_.x) +
-           std::size_t(brick.x);
-  }
+  std::size_t entryOf(const Vec3i& brick) const { return BrickBox{{}, bricks_}.numberOf(brick); }
   Box boxOf(const Vec3i& firstCell, int cells, int cellsAround = 0) const;
   Interval rangeOf(const Interval& brick, const Codes& codes) const;
   std::int32_t regionAt(const Vec3f& point) const;

@@ -1,10 +1,8 @@
 // What a marcher needs to know about a density before the first ray.
 //
 // Empty space: for every brick the Chebyshev distance to the nearest occupied one, and for constant ones to
-// the nearest other. It is exact after one forward and one backward pass per axis, since the distance is a
-// maximum over axes and the passes take it one axis at a time: the minimum over y of max(|y|, d(y)) only
-// needs d to be known along the axes done before. A ray then leaves whole boxes of empty bricks in one step,
-// so that its cost follows what is there and not how finely the box around it is divided.
+// the nearest other. A ray then leaves whole boxes of empty bricks in one step, so that its cost follows what
+// is there and not how finely the box around it is divided.
 //
 // Bounds: a brick whose six neighbours are full lies inside the hull of the rest, so only the others are
 // looked into.
@@ -18,6 +16,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/volume/detail/brick_distances.h"
 #include "nephele/render/volume/field_density.h"
 
 namespace nephele {
@@ -25,33 +24,6 @@ namespace nephele {
 namespace {
 // Bricks that a ray may leave behind at once; more would cost the passes more than it saves the rays.
 constexpr std::uint8_t kFarthest = 32;
-
-// Lowers entries of a table of `n` entries to their distance from the nearest that is 0, if that is less.
-void spread(std::vector<std::uint8_t>& distances, const Vec3i& n) {
-  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
-  for (int axis = 0; axis != 3; ++axis) {
-    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
-    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
-      std::vector<int> line(along), nearest(along);
-      for (std::size_t j = begin; j != end; ++j)
-        for (int i = 0; i != n[a]; ++i) {
-          std::uint8_t* start = distances.data() + j * stride[b] + std::size_t(i) * stride[a];
-          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
-          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
-          // can improve.
-          for (int k = 0; k != along; ++k) {
-            int best = line[k];
-            for (int step = 1; step < best; ++step) {
-              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
-              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
-            }
-            nearest[k] = best;
-          }
-          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
-        }
-    });
-  }
-}
 
 }  // namespace
 
@@ -167,7 +139,7 @@ void RenderVolume::findOccupied() {
 void RenderVolume::measureEmptiness() {
   emptiness_.assign(density_->table.size(), kFarthest);
   for (const Vec3i& brick : occupied_) emptiness_[density_->tableIndex(brick)] = 0;
-  spread(emptiness_, density_->brickCount);
+  detail::spreadDistances(emptiness_, density_->brickCount);
 }
 
 void RenderVolume::measureUniformity() {
@@ -183,7 +155,7 @@ void RenderVolume::measureUniformity() {
   if (constant == 0) return;
   for (std::size_t entry = 0; entry != grid.table.size(); ++entry)
     if (std::size_t(grid.table[entry]) == constant) uniformity_[entry] = kFarthest;
-  spread(uniformity_, grid.brickCount);
+  detail::spreadDistances(uniformity_, grid.brickCount);
 }
 
 void RenderVolume::measureBounds() {

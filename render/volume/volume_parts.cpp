@@ -29,6 +29,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/scene/black_body.h"
+#include "nephele/render/volume/detail/source_grid.h"
 
 namespace nephele {
 
@@ -39,145 +40,10 @@ constexpr int kChannels = 7;  // density, density times colour, emission
 constexpr double kLargestTable = double(1 << 28);
 constexpr float kHottest = 1e5f;
 
-// From the target's voxels to a source's, in double.
-struct IndexMap {
-  double m[3][3], t[3];
-
-  IndexMap(const BrickGrid& target, const BrickGrid& source) {
-    for (int row = 0; row != 3; ++row) {
-      t[row] = double(source.worldToIndex.translation[row]);
-      for (int k = 0; k != 3; ++k)
-        t[row] += double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.translation[k]);
-      for (int column = 0; column != 3; ++column) {
-        m[row][column] = 0;
-        for (int k = 0; k != 3; ++k)
-          m[row][column] +=
-              double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.linear(k, column));
-      }
-    }
-    snap();
-  }
-
-  Vec3d operator()(const Vec3d& p) const {
-    Vec3d r;
-    for (int row = 0; row != 3; ++row) r[row] = m[row][0] * p.x + m[row][1] * p.y + m[row][2] * p.z + t[row];
-    return r;
-  }
-
-  // The box of a box.
-  void mapped(const Vec3d& low, const Vec3d& high, Vec3d& outLow, Vec3d& outHigh) const {
-    const Vec3d middle = (*this)((low + high) * 0.5), half = (high - low) * 0.5;
-    for (int row = 0; row != 3; ++row) {
-      const double reach =
-          std::fabs(m[row][0]) * half.x + std::fabs(m[row][1]) * half.y + std::fabs(m[row][2]) * half.z;
-      outLow[row] = middle[row] - reach;
-      outHigh[row] = middle[row] + reach;
-    }
-  }
-
-  // Whether voxels coincide, and by how many they are shifted.
-  bool isShift = false;
-  Vec3i shift{};
-
- private:
-  // Takes the rounding of maps for what it is.
-  void snap() {
-    constexpr double tolerance = 1e-5;
-    for (auto& row : m)
-      for (double& value : row)
-        if (std::fabs(value - std::round(value)) < tolerance) value = std::round(value);
-    for (double& value : t)
-      if (std::fabs(value - std::round(value)) < 1e-3) value = std::round(value);
-    isShift = true;
-    for (int row = 0; row != 3; ++row) {
-      for (int column = 0; column != 3; ++column) isShift = isShift && m[row][column] == (row == column);
-      isShift = isShift && t[row] == std::round(t[row]) && std::fabs(t[row]) < 1e8;
-      if (isShift) shift[row] = int(t[row]);
-    }
-  }
-};
-
-// A source grid as the target's voxels see it.
-class Source {
- public:
-  Source(const BrickGrid& target, const BrickGrid& grid)
-      : grid_(grid), toSource_(target, grid), toTarget_(grid, target) {}
-
-  float at(const Vec3i& voxel) const {
-    if (toSource_.isShift) return sample(voxel + toSource_.shift);
-    return at(Vec3d(Vec3f(voxel)));
-  }
-
-  // Between the target's voxels.
-  float at(const Vec3d& place) const {
-    const Vec3d p = toSource_(place);
-    if (!(std::fabs(p.x) < 1e8 && std::fabs(p.y) < 1e8 && std::fabs(p.z) < 1e8)) return grid_.background;
-    const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
-    const Vec3f f{float(p.x - cell.x), float(p.y - cell.y), float(p.z - cell.z)};
-    const Vec3i brick = brickOf(cell);
-    const std::int32_t pool = grid_.poolIndex(brick);
-    if (grid_.ranges[std::size_t(pool)].isPoint()) return grid_.ranges[std::size_t(pool)].min;
-    const float* v =
-        grid_.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
-    constexpr int row = BrickGrid::kWidth, plane = row * row;
-    const auto edge = [&](int offset) { return v[offset] + f.x * (v[offset + 1] - v[offset]); };
-    const auto face = [&](int offset) { return edge(offset) + f.y * (edge(offset + row) - edge(offset)); };
-    return face(0) + f.z * (face(plane) - face(0));
-  }
-
-  // Whether any value above zero lies in the source's bricks around the voxels low .. high, or may come there
-  // by moving.
-  bool reaches(const Vec3i& low, const Vec3i& high, const Vec3d& motion) const {
-    Vec3d a, b;
-    toSource_.mapped(Vec3d(Vec3f(low)) - motion, Vec3d(Vec3f(high)) + motion, a, b);
-    Vec3i first, last;
-    for (int axis = 0; axis != 3; ++axis) {
-      const double lowest = grid_.firstBrick[axis], highest = lowest + grid_.brickCount[axis] - 1;
-      first[axis] = int(std::clamp(std::floor((a[axis] - 0.001) / kBrick), lowest, highest + 1));
-      last[axis] = int(std::clamp(std::floor((b[axis] + 0.001) / kBrick), lowest - 1, highest));
-    }
-    for (int z = first.z; z <= last.z; ++z)
-      for (int y = first.y; y <= last.y; ++y)
-        for (int x = first.x; x <= last.x; ++x)
-          if (grid_.ranges[std::size_t(grid_.poolIndex({x, y, z}))].max > 0) return true;
-    return false;
-  }
-
-  // Calls visit(first, last) with the target's bricks that values above zero may reach, source brick by
-  // source brick.
-  template <class Visit>
-  void visitBricks(const Vec3d& motion, Visit&& visit) const {
-    std::size_t entry = 0;
-    for (int z = 0; z != grid_.brickCount.z; ++z)
-      for (int y = 0; y != grid_.brickCount.y; ++y)
-        for (int x = 0; x != grid_.brickCount.x; ++x, ++entry) {
-          if (!(grid_.ranges[std::size_t(grid_.table[entry])].max > 0)) continue;
-          const Vec3f low((grid_.firstBrick + Vec3i{x, y, z}) * kBrick);
-          Vec3d a, b;
-          toTarget_.mapped(Vec3d(low), Vec3d(low + Vec3f{kBrick, kBrick, kBrick}), a, b);
-          Vec3i first, last;
-          for (int axis = 0; axis != 3; ++axis) {
-            first[axis] = int(std::floor(std::clamp((a[axis] - motion[axis] - 1) / kBrick, -1e8, 1e8)));
-            last[axis] = int(std::floor(std::clamp((b[axis] + motion[axis] + 1) / kBrick, -1e8, 1e8)));
-          }
-          visit(first, last);
-        }
-  }
-
- private:
-  float sample(const Vec3i& voxel) const {
-    return grid_.brick(grid_.poolIndex(
-        brickOf(voxel)))[sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z))];
-  }
-
-  const BrickGrid& grid_;
-  IndexMap toSource_, toTarget_;
-};
-
 struct PartSources {
   const VolumePart* part;
-  std::optional<Source> density, temperature;
-  std::vector<Source> colour, emission, velocity;
+  std::optional<detail::SourceGrid> density, temperature;
+  std::vector<detail::SourceGrid> colour, emission, velocity;
   // Farthest way of anything from where the grids have it, in voxels of the target.
   Vec3d motion{};
 };
@@ -226,28 +92,6 @@ const BrickGrid& finest(const std::vector<VolumePart>& parts) {
   return *best;
 }
 
-// Colours of black bodies between 0 K and the hottest of a part.
-class Incandescence {
- public:
-  explicit Incandescence(float hottest) : perKelvin_(float(kSteps) / std::max(hottest, 1.0f)) {
-    if (hottest <= 0) {
-      table_.resize(kSteps + 2);
-      return;
-    }
-    for (int i = 0; i <= kSteps + 1; ++i) table_.push_back(blackBody(double(i) / double(perKelvin_)));
-  }
-  Vec3f operator()(float kelvin) const {
-    const float x = std::clamp(kelvin * perKelvin_, 0.0f, float(kSteps));
-    const int i = int(x);
-    return table_[std::size_t(i)] + (table_[std::size_t(i + 1)] - table_[std::size_t(i)]) * (x - float(i));
-  }
-
- private:
-  static constexpr int kSteps = 4096;
-  float perKelvin_;
-  std::vector<Vec3f> table_;
-};
-
 class Combiner {
  public:
   explicit Combiner(const std::vector<VolumePart>& parts) : lattice_(finest(parts)) {
@@ -291,7 +135,7 @@ class Combiner {
   void forEachCarrier(Visit&& visit) const {
     for (const PartSources& sources : sources_) {
       if (sources.density && sources.part->share > 0) visit(*sources.density, sources.motion);
-      for (const Source& source : sources.emission) visit(source, sources.motion);
+      for (const detail::SourceGrid& source : sources.emission) visit(source, sources.motion);
       if (sources.temperature) visit(*sources.temperature, sources.motion);
     }
   }
@@ -299,14 +143,14 @@ class Combiner {
   static constexpr int kMostTimes = 64;
   Vec3d farthest(const VolumePart& part) const;
   template <class Place>
-  void add(const PartSources& sources, const Incandescence& incandescence, const Place& voxel,
+  void add(const PartSources& sources, const BlackBodyColours& incandescence, const Place& voxel,
            float (&values)[kChannels]) const;
-  void addMoving(const PartSources& sources, const Incandescence& incandescence, const Vec3i& voxel,
+  void addMoving(const PartSources& sources, const BlackBodyColours& incandescence, const Vec3i& voxel,
                  float (&values)[kChannels]) const;
 
   const BrickGrid& lattice_;
   std::vector<PartSources> sources_;
-  std::vector<Incandescence> incandescence_;
+  std::vector<BlackBodyColours> incandescence_;
   bool hasColour_ = false, hasEmission_ = false;
   bool channels_[kChannels] = {};
   Vec3i first_{}, count_{};
@@ -326,7 +170,7 @@ Vec3d Combiner::farthest(const VolumePart& part) const {
 
 std::vector<Vec3i> Combiner::reachedBricks() {
   Vec3i low{1 << 30, 1 << 30, 1 << 30}, high = -low;
-  forEachCarrier([&](const Source& source, const Vec3d& motion) {
+  forEachCarrier([&](const detail::SourceGrid& source, const Vec3d& motion) {
     source.visitBricks(motion, [&](const Vec3i& first, const Vec3i& last) {
       low = min(low, first);
       high = max(high, last);
@@ -342,7 +186,7 @@ std::vector<Vec3i> Combiner::reachedBricks() {
   first_ = low;
   count_ = high - low + Vec3i{1, 1, 1};
   std::vector<std::uint8_t> reached(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z));
-  forEachCarrier([&](const Source& source, const Vec3d& motion) {
+  forEachCarrier([&](const detail::SourceGrid& source, const Vec3d& motion) {
     source.visitBricks(motion, [&](const Vec3i& first, const Vec3i& last) {
       for (int z = first.z; z <= last.z; ++z)
         for (int y = first.y; y <= last.y; ++y)
@@ -362,8 +206,8 @@ std::vector<Vec3i> Combiner::reachedBricks() {
   return bricks;
 }
 
-void Combiner::addMoving(const PartSources& sources, const Incandescence& incandescence, const Vec3i& voxel,
-                         float (&values)[kChannels]) const {
+void Combiner::addMoving(const PartSources& sources, const BlackBodyColours& incandescence,
+                         const Vec3i& voxel, float (&values)[kChannels]) const {
   const Shutter& shutter = sources.part->shutter;
   Vec3d world{};
   for (int c = 0; c != 3; ++c) world[c] = double(sources.velocity[std::size_t(c)].at(voxel));
@@ -381,7 +225,7 @@ void Combiner::addMoving(const PartSources& sources, const Incandescence& incand
 }
 
 template <class Place>
-void Combiner::add(const PartSources& sources, const Incandescence& incandescence, const Place& voxel,
+void Combiner::add(const PartSources& sources, const BlackBodyColours& incandescence, const Place& voxel,
                    float (&values)[kChannels]) const {
   const VolumePart& part = *sources.part;
   if (sources.density) {
@@ -407,7 +251,7 @@ void Combiner::evaluate(const Vec3i& brick, float* const (&out)[kChannels]) cons
   std::vector<std::size_t> here;
   for (std::size_t i = 0; i != sources_.size(); ++i) {
     bool reaches = sources_[i].density && sources_[i].density->reaches(low, high, sources_[i].motion);
-    for (const Source& source : sources_[i].emission)
+    for (const detail::SourceGrid& source : sources_[i].emission)
       reaches = reaches || source.reaches(low, high, sources_[i].motion);
     reaches = reaches ||
               (sources_[i].temperature && sources_[i].temperature->reaches(low, high, sources_[i].motion));

@@ -34,4 +34,18 @@ struct Slices {
 /// cells before and behind it, weighted by what these hold.
 void storeSlice(const SliceNodes& sum, const Slices& at, float share, float* out);
 
+/// Calls visit(first, end) for the runs of bricks with density among the `count` of a column, whose pool
+/// bricks poolAt(n) tells: 0 where there is none.
+template <class PoolAt, class Visit>
+void forEachFilledRun(int count, PoolAt&& poolAt, Visit&& visit) {
+  for (int n = 0; n != count;) {
+    const int first = n;
+    while (n != count && poolAt(n)) ++n;
+    if (n > first)
+      visit(first, n);
+    else
+      ++n;
+  }
+}
+
 }  // namespace nephele::detail

@@ -38,6 +38,15 @@ Span clip(const Vec3d& origin, const Vec3d& direction, const Box& box) {
   return span;
 }
 
+// What is in the way, and nothing of what is seen of it.
+MarchScene withoutLight(MarchScene scene) {
+  scene.suns.clear();
+  scene.locals.clear();
+  scene.scattered.clear();
+  scene.colour = scene.emission = {};
+  return scene;
+}
+
 }  // namespace
 
 Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOptions& options, const Film& film)
@@ -78,11 +87,7 @@ Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOption
     fieldSteps_.lightLength = lit.voxelSize * finer;
     fieldSteps_.uniformLength = scene_.locals.empty() ? 4 * lit.voxelSize * finer : fieldSteps_.lightLength;
   }
-  shadowScene_ = scene_;
-  shadowScene_.suns.clear();
-  shadowScene_.locals.clear();
-  shadowScene_.scattered.clear();
-  shadowScene_.colour = shadowScene_.emission = {};
+  shadowScene_ = withoutLight(scene_);
   shadowScene_.pixelAngle = 0;
   gains_.sunCount = lit.gains.size();
   for (std::size_t i = 0; i != gains_.sunCount; ++i) gains_.suns[i] = lit.gains[i];
@@ -91,11 +96,7 @@ Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOption
 }
 
 void Picture::preparePoints(const Film& film, const RenderOptions& options) {
-  pointScene_ = scene_;
-  pointScene_.suns.clear();
-  pointScene_.locals.clear();
-  pointScene_.scattered.clear();
-  pointScene_.colour = pointScene_.emission = {};
+  pointScene_ = withoutLight(scene_);
   pointScene_.stepDepth = 0.25f;
   middle_ = camera_.stillAt(0.5);
   if (film.wantsNormals()) normals_.emplace(*lit_.source);

@@ -212,5 +212,14 @@ TEST(Holdout, IsRefusedForPicturesOfAnotherSize) {
   }
 }
 
+TEST(DeepImage, IsRefusedWithoutAListForEveryPixel) {
+  const TemporaryFolder folder;
+  DeepImage image;
+  image.width = image.height = 2;
+  image.pixels.resize(3);
+  EXPECT_THROW(writeDeepExr(folder.file("a.exr"), image, front(2)), Error);
+  EXPECT_THROW(Holdout{image}, Error);
+}
+
 }  // namespace
 }  // namespace nephele

@@ -91,6 +91,16 @@ TEST(ExrIo, LeavesNothingWhereItCannotWrite) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
+TEST(ExrIo, RefusesAChannelThatHasNotAValueForEveryPixel) {
+  // Rows of pixels that are not there would be read from behind the channel's memory.
+  const test::TemporaryFolder folder;
+  Image image = someImage();
+  image.channels[0].values.pop_back();
+  EXPECT_THROW(writeExr(folder.file("a.exr"), image, someCamera()), Error);
+  EXPECT_THROW(writePng(folder.file("a.png"), image, {}), Error);
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
 TEST(ExrIo, NamesTheFileThatItCannotRead) {
   const test::TemporaryFolder folder;
   std::vector<std::string> paths{folder.file("missing.exr"), test::ownData("CMakeLists.txt")};

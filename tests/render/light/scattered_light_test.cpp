@@ -115,6 +115,9 @@ TEST(ScatteredLight, RefusesUselessOptions) {
   ScatteredLight::Options options;
   options.directions = 2;
   EXPECT_THROW(ScatteredLight(volume, {1, 1, 0}, nullptr, options), Error);
+  for (const Scattering& scattering : {Scattering{-1.0f, 0.5f, 0.0f}, Scattering{NAN, 0.5f, 0.0f},
+                                       Scattering{1.0f, 1.5f, 0.0f}, Scattering{1.0f, 1.0f, 1.0f}})
+    EXPECT_THROW(ScatteredLight(volume, scattering, nullptr), Error);
 }
 
 }  // namespace

@@ -1,0 +1,80 @@
+// A sweep of light maps J to K(albedo (J + beam)), and J is its fixed point, reached by Anderson's
+// acceleration (1965) with a memory of a few sweeps: where a plain iteration needs a sweep per scattering, a
+// hundred and more in a cloud, this takes some eight.
+#include "nephele/render/light/detail/anderson.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele::detail {
+
+float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
+  const std::size_t n = x.size();
+  if (!lastX_.empty()) {
+    if (dx_.size() == kMemory) {
+      std::rotate(dx_.begin(), dx_.begin() + 1, dx_.end());
+      std::rotate(df_.begin(), df_.begin() + 1, df_.end());
+    } else {
+      dx_.emplace_back(n), df_.emplace_back(n);
+    }
+  }
+  const std::size_t m = dx_.size();
+  constexpr std::size_t piece = 1 << 15;
+  std::vector<Products> pieces((n + piece - 1) / piece);
+  parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p != end; ++p)
+      for (std::size_t i = p * piece; i != std::min(n, (p + 1) * piece); ++i) {
+        const float f = g[i] - x[i], weight = weights_[i];
+        if (m > 0) dx_[m - 1][i] = x[i] - lastX_[i], df_[m - 1][i] = f - lastF_[i];
+        if (weight == 0) continue;
+        Products& sums = pieces[p];
+        for (std::size_t r = 0; r != m; ++r) {
+          const float mine = weight * df_[r][i];
+          for (std::size_t c = 0; c != m; ++c) sums[r * kColumns + c] += double(mine * df_[c][i]);
+          sums[r * kColumns + kMemory] += double(mine * f);
+        }
+        sums[kMemory * kColumns] += double(weight * std::fabs(f));
+        sums[kMemory * kColumns + 1] += double(weight * g[i]);
+      }
+  });
+  // Added in a fixed order, so that the sums do not depend on the threads.
+  Products a{};
+  for (const Products& sums : pieces)
+    for (std::size_t k = 0; k != a.size(); ++k) a[k] += sums[k];
+  const std::array<double, kMemory> share = solve(a, m);
+
+  lastX_ = x;
+  lastF_.resize(n);
+  parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin * piece; i != std::min(n, end * piece); ++i) {
+      lastF_[i] = g[i] - x[i];
+      float next = g[i];
+      for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * (dx_[r][i] + df_[r][i]);
+      x[i] = std::max(next, 0.0f);
+    }
+  });
+  const double whole = a[kMemory * kColumns + 1];
+  return whole > 0 ? float(a[kMemory * kColumns] / whole) : 0.0f;
+}
+
+// Least squares by the normal equations, a little damped.
+std::array<double, Anderson::kMemory> Anderson::solve(Products a, std::size_t m) {
+  std::array<double, kMemory> result{};
+  for (std::size_t r = 0; r != m; ++r) a[r * kColumns + r] *= 1 + 1e-8;
+  for (std::size_t r = 0; r != m; ++r)
+    for (std::size_t below = r + 1; below != m; ++below) {
+      if (!(a[r * kColumns + r] > 0)) continue;
+      const double times = a[below * kColumns + r] / a[r * kColumns + r];
+      for (std::size_t c = r; c != kColumns; ++c) a[below * kColumns + c] -= times * a[r * kColumns + c];
+    }
+  for (std::size_t r = m; r-- != 0;) {
+    double rest = a[r * kColumns + kMemory];
+    for (std::size_t c = r + 1; c != m; ++c) rest -= a[r * kColumns + c] * result[c];
+    result[r] = a[r * kColumns + r] > 0 ? rest / a[r * kColumns + r] : 0;
+  }
+  return result;
+}
+
+}  // namespace nephele::detail
