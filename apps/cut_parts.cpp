@@ -5,7 +5,7 @@
 
 #include "apps/options/cut_options.h"
 #include "nephele/levelset/cut/cut_input.h"
-#include "nephele/levelset/cut/cut_level_set.h"
+#include "nephele/levelset/cut/marching_tetrahedra.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
@@ -70,8 +70,8 @@ PieceFilesOptions CutArguments::files(const CutKnives& knives, const Run& run) c
   files.source = input;
   files.geometry = geometry == Geometry::exact ? "exact" : "levelset";
   files.knives = knives.names;
-  files.cells = knives.exact.cells;
-  files.kerf = double(knives.exact.kerf);
+  files.cells = knives.knives.cells;
+  files.kerf = double(knives.options.kerf);
   files.metadata = run.metadata();
   files.metadata["seed"] = std::to_string(seed);
   return files;

@@ -7,15 +7,15 @@
 namespace nephele::apps {
 namespace {
 
-void reportKnives(const PieceSet& set, const CutKnives& knives, Run& run) {
-  if (set.slivers > 0)
-    run.note(fmt::format("{} {} left out, too small, of volume {:g} together", set.slivers,
-                         set.slivers == 1 ? "part" : "parts", set.sliverVolume));
+void reportKnives(const Pieces& pieces, const CutKnives& knives, Run& run) {
+  if (pieces.slivers > 0)
+    run.note(fmt::format("{} {} left out, too small, of volume {:g} together", pieces.slivers,
+                         pieces.slivers == 1 ? "part" : "parts", pieces.sliverVolume));
   std::vector<std::string> missing;
   for (std::size_t k = 0; k < knives.names.size(); ++k) {
-    const auto side = [&](const NamedPiece& piece) { return piece.code.sides[k]; };
-    if (std::ranges::all_of(set.pieces,
-                            [&](const auto& piece) { return side(piece) == side(set.pieces[0]); }))
+    const auto side = [&](const Piece& piece) { return piece.code.sides[k]; };
+    if (std::ranges::all_of(pieces.pieces,
+                            [&](const auto& piece) { return side(piece) == side(pieces.pieces[0]); }))
       missing.push_back(knives.names[k]);
   }
   if (missing.size() > 3)
@@ -24,30 +24,30 @@ void reportKnives(const PieceSet& set, const CutKnives& knives, Run& run) {
     for (const std::string& name : missing) run.note(name + ": parts nothing");
 }
 
-nlohmann::json statistics(const PieceSet& set) {
-  nlohmann::json pieces = nlohmann::json::array();
-  for (const NamedPiece& piece : set.pieces) {
+nlohmann::json statistics(const Pieces& pieces) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Piece& piece : pieces.pieces) {
     const Vec3d& c = piece.mass.centroid;
-    pieces.push_back({{"name", piece.name},
-                      {"code", codeText(piece.code)},
-                      {"volume", piece.mass.volume},
-                      {"area", piece.mass.area},
-                      {"centroid", {c.x, c.y, c.z}},
-                      {"closed", piece.closed}});
-    if (piece.cell) pieces.back()["cell"] = *piece.cell;
+    list.push_back({{"name", piece.name},
+                    {"code", codeText(piece.code)},
+                    {"volume", piece.mass.volume},
+                    {"area", piece.mass.area},
+                    {"centroid", {c.x, c.y, c.z}},
+                    {"closed", piece.closed}});
+    if (piece.cell) list.back()["cell"] = *piece.cell;
   }
-  return pieces;
+  return list;
 }
 
 }  // namespace
 
-void report(const PieceSet& set, const CutKnives& knives, Run& run) {
-  reportKnives(set, knives, run);
-  run.stats["pieces"] = statistics(set);
-  run.stats["volume_original"] = set.volumeOriginal;
-  run.stats["volume_sum"] = set.volumeSum;
-  run.stats["levelsets_nonempty"] = set.codes;
-  run.stats["slivers"] = {{"count", set.slivers}, {"volume", set.sliverVolume}};
+void report(const Pieces& pieces, const CutKnives& knives, Run& run) {
+  reportKnives(pieces, knives, run);
+  run.stats["pieces"] = statistics(pieces);
+  run.stats["volume_original"] = pieces.volumeOriginal;
+  run.stats["volume_sum"] = pieces.volumeSum;
+  run.stats["levelsets_nonempty"] = pieces.codes;
+  run.stats["slivers"] = {{"count", pieces.slivers}, {"volume", pieces.sliverVolume}};
 }
 
 void reportCrossings(std::size_t crossings, Run& run) {

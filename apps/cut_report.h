@@ -6,7 +6,7 @@ namespace nephele::apps {
 
 /// What a cut made, into the statistics; what the user should know of it, as notes: parts that were left out,
 /// knives that part nothing.
-void report(const PieceSet& set, const CutKnives& knives, Run& run);
+void report(const Pieces& pieces, const CutKnives& knives, Run& run);
 
 /// Says that a mesh crosses itself in so many pairs of triangles.
 void reportCrossings(std::size_t crossings, Run& run);

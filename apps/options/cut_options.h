@@ -44,13 +44,12 @@ struct CutArguments {
 
 /// The knives that the arguments ask for, for parts that are there.
 struct CutKnives {
-  MeshCutOptions exact;
+  Knives knives;
+  CutOptions options;
   /// For pieces.json and messages, in the order of the codes.
   std::vector<std::string> names;
+  /// Of level sets.
   double voxelSize = 0;
-
-  /// The same knives for level sets. @throws Error where a mesh cannot be one.
-  CutOptions forLevelSets(const Progress& progress) const;
 };
 
 /// @throws CLI::ValidationError if there is no knife, Error naming a file.

@@ -13,7 +13,7 @@
 namespace nephele::apps {
 namespace {
 
-PieceSet cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Run& run) {
+Pieces cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Run& run) {
   for (CutPart& part : parts) {
     const MeshToLevelSetOptions options{.voxelSize = knives.voxelSize};
     run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
@@ -26,7 +26,7 @@ PieceSet cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Ru
         throw Error(fmt::format("{}: {}", part.name, error.what()));
       }
   }
-  return cutPartsAsLevelSets(parts, knives.forLevelSets(run), run);
+  return cutIntoLevelSets(parts, knives.voxelSize, knives.knives, knives.options, run);
 }
 
 void cut(const CutArguments& arguments, Run& run) {
@@ -39,23 +39,24 @@ void cut(const CutArguments& arguments, Run& run) {
   });
   const CutKnives knives = knivesOf(arguments, parts, run);
   const bool isExact = arguments.geometry == CutArguments::Geometry::exact;
-  const PieceSet set = isExact ? cutParts(parts, knives.exact, run) : cutAsLevelSets(parts, knives, run);
-  if (set.pieces.empty())
+  const Pieces pieces =
+      isExact ? cutIntoMeshes(parts, knives.knives, knives.options, run) : cutAsLevelSets(parts, knives, run);
+  if (pieces.pieces.empty())
     throw Error(fmt::format("no piece is left: all {} parts are smaller than --min-volume, {:g} together",
-                            set.slivers, set.sliverVolume));
-  report(set, knives, run);
+                            pieces.slivers, pieces.sliverVolume));
+  report(pieces, knives, run);
 
   run.begin("write");
-  writePieces(set, arguments.files(knives, run), run);
+  writePieces(pieces, arguments.files(knives, run), run);
   if (!arguments.preview.empty()) {
     PiecesPictureOptions picture = arguments.picture;
     picture.explode = arguments.explode.value_or(picture.explode);
-    writePng(arguments.preview, picturePieces(set, picture, run), {}, run.metadata());
+    writePng(arguments.preview, picturePieces(pieces, picture, run), {}, run.metadata());
   }
   reportCrossings(crossings.get(), run);
-  run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})", arguments.folder, set.pieces.size(),
-                         set.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces", set.volumeSum,
-                         set.volumeOriginal));
+  run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})", arguments.folder, pieces.pieces.size(),
+                         pieces.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces",
+                         pieces.volumeSum, pieces.volumeOriginal));
 }
 
 }  // namespace

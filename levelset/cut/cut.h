@@ -2,40 +2,22 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "nephele/levelset/cut/knives.h"
+#include "nephele/levelset/cut/piece_level_set.h"
 #include "nephele/levelset/mesh/mass_properties.h"
-#include "nephele/modeling/base/mesh.h"
-#include "nephele/modeling/base/progress.h"
-#include "nephele/modeling/shape/knives.h"
 
+/// Cutting meshes and level sets into pieces. Source: Tessendorf, Resolution Independent Volumes, chapter 5.
 namespace nephele {
 
-/// A plane with hills as a triangulated height field: the hills of `roughKnife`, read on the plane at the
-/// points of a lattice. Its sides at half a kerf are raised by that times the secant of the slope.
-struct RoughBlade {
-  BladePlane plane;
-  RoughnessOptions roughness{};
-  /// Between the points of the lattice, world units. 0: an eighth of the shortest wave of the roughness, but
-  /// no finer than the size of the solid / 400.
-  float spacing = 0.0f;
-};
-
-struct MeshCutOptions {
-  /// Flat blades.
-  std::vector<BladePlane> planes{};
-  /// Points whose Voronoi cells part the solid, too. Empty: none.
-  std::vector<Vec3f> cells{};
+struct CutOptions {
   /// Width of the cut, world units, >= 0: half of it goes from each side of every knife.
   float kerf = 0.0f;
-  /// Rough blades.
-  std::vector<RoughBlade> rough{};
-  /// Closed meshes as knives: their inside is the positive side. With a kerf their faces move along their
-  /// normals.
-  std::vector<Mesh> solids{};
-  /// Pieces with less volume are left out, world units cubed, >= 0. Those below 1e-12 of the whole always
-  /// are.
-  double minVolume = 0.0;
+  /// Pieces with less volume are left out and counted, world units cubed, >= 0. Default: 0 for meshes, where
+  /// those below 1e-12 of the whole always are; a voxel for level sets.
+  std::optional<double> minVolume{};
 };
 
 /// Where two pieces touch.
@@ -45,32 +27,42 @@ struct PieceContact {
   double area = 0.0;
 };
 
-/// A connected part of a solid that was cut.
-struct MeshPiece {
-  /// Closed triangles, every edge with two faces and every vertex with one fan. Outer faces come first, by
-  /// the groups of the source; what the knives made is the last group, `inside`.
+/// A connected part of what was cut.
+struct Piece {
+  /// Of cuts of parts only, see cut_parts.h: what it is called, and the piece that it was cut from, if any.
+  std::string name{}, parent{};
+  /// Closed triangles. Empty where a field was cut into level sets.
   ///
-  /// Corner attributes are those of the source, on cut faces read at the place of the corner in its source
-  /// triangle, so that seams stay. Vertex attributes likewise; vertices on inner faces alone have the mean of
-  /// the source. `uv` is there always: on inner faces it is the place on the knife in world units, the same
-  /// from both sides: on the plane, also of a rough blade; of a solid on the axis plane that the face looks
-  /// at most; on outer faces of a source without `uv` it is 0, as are other corner attributes inside.
-  Mesh mesh;
-  /// The sides of the planes, then of the rough blades, then of the solids, each in their order: true where
-  /// (x - point) . normal > 0, above the hills, inside.
-  PieceCode code;
+  /// Outer faces come first, by the groups of the source; what the knives made is the last group, `inside`.
+  /// Of meshes, corner attributes are those of the source, on cut faces read at the place of the corner in
+  /// its source triangle, so that seams stay. Vertex attributes likewise; vertices on inner faces alone have
+  /// the mean of the source. `uv` is there always: on inner faces it is the place on the knife in world
+  /// units, the same from both sides: on the plane, also of a rough blade; of others on the axis plane that
+  /// the face looks at most; on outer faces of a source without `uv` it is 0, as are other corner attributes
+  /// inside.
+  Mesh mesh{};
+  /// Of cuts into level sets: min(shape, +-knives - kerf / 2, distance to the cell's sides) within the band
+  /// of its surface, the band's ends beyond. Other pieces of the same code are outside of it. Where the piece
+  /// is thinner than a voxel, it may show several shells.
+  std::optional<PieceLevelSet> level{};
+  PieceCode code{};
   /// Which of the cells, if there are any.
-  std::optional<std::uint32_t> cell;
-  MassProperties mass;
+  std::optional<std::uint32_t> cell{};
+  /// Of the mesh, and whether each of its edges has a face on either side.
+  MassProperties mass{};
   Vec3d boxMin{}, boxMax{};
+  bool closed = false;
   /// In the order of their indices; none across a kerf.
-  std::vector<PieceContact> neighbours;
+  std::vector<PieceContact> neighbours{};
 };
 
-struct MeshPieces {
-  /// By cell, then by code with the negative side first, then by the order of the source's faces.
-  std::vector<MeshPiece> pieces;
-  /// Parts below `minVolume`, and the volume that went with them.
+struct Pieces {
+  std::vector<Piece> pieces;
+  /// Of what was cut, and of the pieces; 0 where a field was cut into level sets.
+  double volumeOriginal = 0.0, volumeSum = 0.0;
+  /// Combinations of sides and cells that hold pieces, of the many that could.
+  std::size_t codes = 0;
+  /// Parts below the least volume, and the volume that went with them.
   std::size_t slivers = 0;
   double sliverVolume = 0.0;
 };
@@ -83,7 +75,8 @@ struct MeshPieces {
 /// that there are. Cut points depend on the edge and the knife alone: both sides of a cut have the same
 /// points, bit for bit, and the same triangles. Points closer to a plane than 1e-11 of the solid's size count
 /// as on it, and are not moved; a face in a knife goes with the solid below it, and is no cut. A knife that
-/// misses the solid leaves it as it is. With a kerf there may be no pieces at all.
+/// misses the solid leaves it as it is. With a kerf there may be no pieces at all. Pieces come by cell, then
+/// by code with the negative side first, then by the order of the source's faces.
 ///
 /// Order of the knives: the same pieces in another order, up to rounding. The same result at any number of
 /// threads. Limits: a mesh that crosses itself is cut by planes and cells as it is: its pieces cross
@@ -95,9 +88,53 @@ struct MeshPieces {
 /// log n in all triangles, and some 20 microseconds for each pair of them that meet.
 /// @throws Error if the mesh or a solid has no faces, is open or inside out, values are not finite, a normal
 /// is 0, cells are equal, minVolume, kerf or a spacing < 0, a spacing is too fine for the solid, the sides of
-/// a solid's kerf cross themselves, or the mesh or a solid crosses itself where another surface passes;
-/// Cancelled. As `roughKnife` for rough blades.
-/// Source: Tessendorf, Resolution Independent Volumes, chapter 5.
-MeshPieces cutMesh(const Mesh& mesh, const MeshCutOptions& options, const Progress& progress = silent());
+/// a solid's kerf cross themselves, the mesh or a solid crosses itself where another surface passes, or there
+/// are fields among the knives; Cancelled. As `roughKnife` for rough blades.
+Pieces cutIntoMeshes(const Mesh& mesh, const Knives& knives, const CutOptions& options = {},
+                     const Progress& progress = silent());
+
+/// Cuts a level set exactly into closed meshes, by linear cells: every cell of its lattice is six tetrahedra,
+/// in each of which the level set and all knives are linear between their values at the corners.
+///
+/// So rims are sharp, both sides of a cut have the same triangles, and the volumes of the pieces sum to that
+/// of `marchingTetrahedra`. Planes and cells, which are linear everywhere, cut whole triangles, and their
+/// faces are as large as can be; other knives have the triangles of the lattice. Their vertices lie on the
+/// blade within a thousandth of a voxel; beside rims and other knives, where they are those of linear cells,
+/// they are off a blade of radius r by at most 3 / 8 voxel^2 / r. Decisions are exact (`TetrahedronFacets` in
+/// the sources): knives may meet anywhere, in samples, or coincide with the surface, and any level set does.
+/// Equal fields, or equal rough blades, cut once. The order of the knives changes nothing but the order of
+/// the signs in the codes: pieces come in the same order, with the same bits. The same result at any number
+/// of threads. Cost: as for meshes for planes and cells; for other knives the cells inside the level set that
+/// they pass.
+/// @throws Error if the level set has no surface or its background is inside, values are not finite, a normal
+/// is 0, cells are equal, minVolume or kerf < 0, or there are more than 16 000 knives; as `roughKnife` for
+/// rough blades, `solidKnife` for solids; Cancelled.
+Pieces cutIntoMeshes(const BrickGrid& level, const Knives& knives, const CutOptions& options = {},
+                     const Progress& progress = silent());
+
+/// Where the samples of pieces as level sets stand.
+struct PieceLattice {
+  /// Edge of a voxel, world units, > 0. Voxels stand at integer multiples of it.
+  float voxelSize = 0.0f;
+  /// A box around the surface of the shape, world units.
+  Box box{};
+  /// How far from their surface the pieces hold values, voxels, 2 to 7.
+  float bandVoxels = 3.0f;
+};
+
+/// Cuts a shape into pieces, as level sets.
+///
+/// `shape` is positive inside and a distance within the band; beyond it may be any number of the right sign.
+/// One walk finds the side of every knife for every voxel inside; only combinations that occur are ever
+/// looked at, so cost follows what is there: bricks that no blade passes are settled by ranges, and pieces
+/// are written where their surfaces are. Voxels on a blade, or within half a kerf of it, belong to no piece.
+/// Pieces come in the order of their first voxels by z, y, x. The result is the same bit for bit at any
+/// thread count and for any order of the knives; the bits of the codes follow the knives.
+///
+/// Where two surfaces meet at an angle the grid bevels the rim, by some (voxelSize)^2 / 4 across.
+/// @throws Error for options outside their range, equal cells, a box too large for its voxels; as for
+/// `asFields`; Cancelled.
+Pieces cutIntoLevelSets(const ScalarField& shape, const PieceLattice& lattice, const Knives& knives,
+                        const CutOptions& options = {}, const Progress& progress = silent());
 
 }  // namespace nephele

@@ -16,8 +16,7 @@ namespace nephele {
 std::shared_ptr<const BrickGrid> readLevelSet(const std::string& path) {
   const VdbGrid grid = readScalarGrid(path);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
-    throw Error(fmt::format("{}: grid '{}' is not a level set; 'nephele mesh' makes a mesh of a density",
-                            path, info.name));
+    throw Error(fmt::format("{}: grid '{}' is not a level set; make a mesh of it first", path, info.name));
   return toBricks(grid);
 }
 

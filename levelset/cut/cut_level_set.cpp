@@ -1,14 +1,12 @@
 // Cutting level sets by linear cells.
 //
 // Curved knives are brought to the level set's own lattice (lattice_carve.cpp). Planes and bisectors of cells
-// are linear everywhere, so that splitting the closed parts that are left by them (cut_mesh.cpp) is the
+// are linear everywhere, so that splitting the closed parts that are left by them (flat_cut.cpp) is the
 // same as splitting all tetrahedra, without the pieces of faces that lie in one plane.
 //
 // Rounding, and ties, depend on the order in which knives are taken. They are taken in an order of their own:
 // planes, rough blades and points by their numbers, fields by their values at some points; codes and cells
 // are then put into the order of the caller.
-#include "nephele/levelset/cut/cut_level_set.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,8 +14,12 @@
 #include <numeric>
 #include <tuple>
 
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/cut/detail/flat_cut.h"
 #include "nephele/levelset/cut/detail/lattice_carve.h"
+#include "nephele/levelset/cut/detail/level_set_cut.h"
+#include "nephele/levelset/cut/detail/piece_measures.h"
+#include "nephele/levelset/cut/marching_tetrahedra.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/noise/noise_draw.h"
 
@@ -61,20 +63,20 @@ std::vector<float> valuesOf(const Knife& knife, const Box& box) {
 /// The knives that are no planes, and where the caller has them.
 struct CurvedKnives {
   std::vector<LatticeKnife> knives;
-  /// Per rough blade, then per field: its place in `knives`.
+  /// Per rough blade, solid and field: its place in `knives`.
   std::vector<std::uint32_t> places;
 };
 
-CurvedKnives curvedKnives(const LevelSetCutOptions& options, const Box& box) {
+CurvedKnives curvedKnives(const Knives& knives, float kerf, const BrickGrid& level,
+                          const Progress& progress) {
+  Knives curved = knives;
+  curved.planes.clear();
+  const Box box = level.worldBox();
   std::vector<LatticeKnife> given;
-  for (const RoughBlade& blade : options.rough)
-    given.push_back(
-        {roughKnife(blade.plane, blade.roughness), PlaneFrame::of(normalize(Vec3d(blade.plane.normal)))});
-  for (const Knife& knife : options.knives) {
-    require(std::isfinite(knife.steepest) && knife.steepest >= 1,
-            fmt::format("cut: a knife's steepest gradient must be >= 1, got {}", knife.steepest));
+  for (const Knife& knife : asFields(curved, double(level.voxelSize), kerf, progress))
     given.push_back({knife});
-  }
+  for (std::size_t i = 0; i < knives.rough.size(); ++i)
+    given[i].frame = PlaneFrame::of(normalize(Vec3d(knives.rough[i].plane.normal)));
   std::vector<std::vector<float>> values;
   for (const LatticeKnife& knife : given) values.push_back(valuesOf(knife.knife, box));
   CurvedKnives result;
@@ -95,72 +97,57 @@ CurvedKnives curvedKnives(const LevelSetCutOptions& options, const Box& box) {
   return result;
 }
 
-Mesh meshOf(const Carved& carved) {
-  constexpr std::uint32_t kUnused = ~0u;
-  std::vector<std::uint32_t> numbers(carved.positions.size(), kUnused);
-  Mesh mesh;
-  mesh.corners.reserve(3 * carved.triangles.size());
-  mesh.faceStart.reserve(carved.triangles.size() + 1);
-  for (const detail::TriangleIndices& t : carved.triangles) mesh.addFace(t);
-  for (const std::uint32_t v : mesh.corners) numbers[v] = 0;
-  for (std::size_t v = 0; v < numbers.size(); ++v) {
-    if (numbers[v] == kUnused) continue;
-    numbers[v] = std::uint32_t(mesh.positions.size());
-    mesh.positions.push_back(carved.positions[v]);
-  }
-  for (std::uint32_t& v : mesh.corners) v = numbers[v];
-  return mesh;
-}
-
 }  // namespace
 
-Mesh marchingTetrahedra(const BrickGrid& level, const Progress& progress) {
-  progress.begin("triangles");
-  Mesh mesh = meshOf(detail::carveLattice(level, {}, 0, progress));
-  progress.count("triangles", double(mesh.faceCount()));
-  return mesh;
-}
+namespace detail {
 
-MeshPieces cutLevelSet(const BrickGrid& level, const LevelSetCutOptions& options, const Progress& progress) {
-  return cutLevelSet(level, marchingTetrahedra(level, progress), options, progress);
-}
-
-MeshPieces cutLevelSet(const BrickGrid& level, const Mesh& whole, const LevelSetCutOptions& options,
-                       const Progress& progress) {
+Pieces cutLevelSet(const BrickGrid& level, const Mesh& whole, const Knives& knives, const CutOptions& options,
+                   const Progress& progress) {
   requireValid(whole);
-  MeshCutOptions flat{.kerf = options.kerf};
-  flat.minVolume = options.minVolume.value_or(std::abs(double(determinant(level.indexToWorld.linear))));
+  requireKnives(knives, options);
+  CutOptions flatOptions = options;
+  if (!options.minVolume) flatOptions.minVolume = std::abs(double(determinant(level.indexToWorld.linear)));
   std::vector<std::tuple<Vec3f, Vec3f>> planes;
-  for (const BladePlane& plane : options.planes) planes.push_back(numbersOf(plane));
-  const auto planeOrder = sorted(planes), cellOrder = sorted(options.cells);
-  for (const std::uint32_t i : planeOrder) flat.planes.push_back(options.planes[i]);
-  for (const std::uint32_t i : cellOrder) flat.cells.push_back(options.cells[i]);
-  detail::requireFlatKnives(flat);
-  const CurvedKnives curved = curvedKnives(options, level.worldBox());
+  for (const BladePlane& plane : knives.planes) planes.push_back(numbersOf(plane));
+  const auto planeOrder = sorted(planes), cellOrder = sorted(knives.cells);
+  Knives flat;
+  for (const std::uint32_t i : planeOrder) flat.planes.push_back(knives.planes[i]);
+  for (const std::uint32_t i : cellOrder) flat.cells.push_back(knives.cells[i]);
 
   require(whole.faceCount() > 0, "cut: the level set has no surface");
-  detail::CutSource source(whole, "the level set");
+  const CurvedKnives curved = curvedKnives(knives, options.kerf, level, progress);
+  CutSource source(whole, "the level set");
   std::vector<Carved::Part> parts(1);
   if (curved.knives.empty()) {
     parts[0].triangles.resize(source.triangles().size());
     std::iota(parts[0].triangles.begin(), parts[0].triangles.end(), 0u);
   } else {
     progress.begin("knives");
-    Carved carved = detail::carveLattice(level, curved.knives, options.kerf, progress);
+    Carved carved = carveLattice(level, curved.knives, options.kerf, progress);
     parts = std::move(carved.parts);
     source.refine(std::move(carved));
   }
-  MeshPieces result = detail::piecesOf(source, parts, flat, progress);
+  Pieces result = piecesOf(source, parts, flat, flatOptions, progress);
 
-  for (MeshPiece& piece : result.pieces) {
+  for (Piece& piece : result.pieces) {
     const std::vector<bool> taken = std::move(piece.code.sides);
-    piece.code.sides.assign(options.planes.size() + curved.places.size(), false);
+    piece.code.sides.assign(knives.signs(), false);
     for (std::size_t i = 0; i < planeOrder.size(); ++i) piece.code.sides[planeOrder[i]] = taken[i];
     for (std::size_t i = 0; i < curved.places.size(); ++i)
-      piece.code.sides[options.planes.size() + i] = taken[options.planes.size() + curved.places[i]];
+      piece.code.sides[planeOrder.size() + i] = taken[planeOrder.size() + curved.places[i]];
     if (piece.cell) piece.cell = cellOrder[*piece.cell];
   }
+  result.volumeOriginal = massProperties(whole).volume;
+  sumUp(result);
+  checkClosed(result.pieces, progress);
   return result;
+}
+
+}  // namespace detail
+
+Pieces cutIntoMeshes(const BrickGrid& level, const Knives& knives, const CutOptions& options,
+                     const Progress& progress) {
+  return detail::cutLevelSet(level, marchingTetrahedra(level, progress), knives, options, progress);
 }
 
 }  // namespace nephele

@@ -14,17 +14,18 @@
 #include <numeric>
 #include <set>
 
-#include "nephele/levelset/cut/cut_level_set.h"
+#include "nephele/levelset/cut/detail/level_set_cut.h"
+#include "nephele/levelset/cut/detail/piece_measures.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
-#include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele {
 namespace {
 
-constexpr const char* kInside = "inside";
+using detail::ContactAreas;
+using detail::kInsideGroup;
 
 Vec3d cornerOf(const Mesh& mesh, std::size_t face, std::size_t k) {
   return mesh.positions[mesh.corners[3 * face + k]];
@@ -40,31 +41,6 @@ Vec3d normalOf(const Mesh& mesh, std::size_t face) {
   return cross(cornerOf(mesh, face, 1) - a, cornerOf(mesh, face, 2) - a);
 }
 
-bool isClosed(const Mesh& mesh) {
-  std::vector<std::uint64_t> edges;
-  edges.reserve(mesh.corners.size());
-  for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
-    const auto face = mesh.face(f);
-    for (std::size_t k = 0; k < face.size(); ++k) {
-      const std::uint32_t a = face[k], b = face[(k + 1) % face.size()];
-      edges.push_back((std::uint64_t(std::min(a, b)) << 32 | std::max(a, b)) << 1 | (a < b ? 1 : 0));
-    }
-  }
-  std::sort(edges.begin(), edges.end());
-  for (std::size_t i = 0; i < edges.size(); i += 2)
-    if (i + 1 == edges.size() || edges[i] + 1 != edges[i + 1]) return false;
-  return !edges.empty();
-}
-
-void setMeasures(NamedPiece& piece) {
-  piece.mass = massProperties(piece.mesh);
-  piece.boxMin = piece.boxMax = piece.mesh.positions[0];
-  for (const Vec3d& p : piece.mesh.positions) {
-    piece.boxMin = min(piece.boxMin, p);
-    piece.boxMax = max(piece.boxMax, p);
-  }
-}
-
 void requireNames(std::span<const CutPart> parts) {
   require(!parts.empty(), "cut: nothing to cut");
   std::set<std::string> names;
@@ -73,9 +49,9 @@ void requireNames(std::span<const CutPart> parts) {
 }
 
 /// Gives the pieces of a part their names, and faces that are in no group one.
-void nameThem(std::vector<NamedPiece>& pieces, const CutPart& part) {
+void nameThem(std::vector<Piece>& pieces, const CutPart& part) {
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    NamedPiece& piece = pieces[i];
+    Piece& piece = pieces[i];
     piece.name = fmt::format("{}_{:04}", part.name, i + 1);
     if (part.parent) piece.parent = part.name;
     std::vector<MeshGroup>& groups = piece.mesh.groups;
@@ -85,61 +61,36 @@ void nameThem(std::vector<NamedPiece>& pieces, const CutPart& part) {
   }
 }
 
-/// What one part became.
-struct Result {
-  std::vector<NamedPiece> pieces{};
-  double volume = 0.0;
-  std::size_t slivers = 0;
-  double sliverVolume = 0.0;
-};
-
-using Codes = std::set<std::pair<std::vector<bool>, std::uint32_t>>;
-
-PieceSet gathered(std::vector<Result> results) {
-  PieceSet set;
-  Codes codes;
+/// The pieces of all parts, part by part.
+Pieces gathered(std::vector<Pieces> ofParts) {
+  Pieces all;
   std::set<std::string> names;
-  for (Result& result : results) {
-    const auto first = std::uint32_t(set.pieces.size());
-    for (NamedPiece& piece : result.pieces) {
+  for (Pieces& part : ofParts) {
+    const auto first = std::uint32_t(all.pieces.size());
+    for (Piece& piece : part.pieces) {
       for (PieceContact& neighbour : piece.neighbours) neighbour.piece += first;
-      codes.emplace(piece.code.sides, piece.cell.value_or(0));
-      set.volumeSum += piece.mass.volume;
       require(names.insert(piece.name).second,
               fmt::format("cut: two pieces would be called '{}'; rename what is cut", piece.name));
-      set.pieces.push_back(std::move(piece));
+      all.pieces.push_back(std::move(piece));
     }
-    set.volumeOriginal += result.volume;
-    set.slivers += result.slivers;
-    set.sliverVolume += result.sliverVolume;
+    all.volumeOriginal += part.volumeOriginal;
+    all.slivers += part.slivers;
+    all.sliverVolume += part.sliverVolume;
   }
-  set.codes = codes.size();
-  return set;
+  detail::sumUp(all);
+  return all;
 }
 
 /// Calls f(face) for every face of the groups called `inside`.
 template <class F>
 void forInnerFaces(const Mesh& mesh, const F& f) {
   for (const MeshGroup& group : mesh.groups)
-    if (group.name == kInside)
+    if (group.name == kInsideGroup)
       for (std::size_t i = group.firstFace; i < std::size_t(group.firstFace) + group.faceCount; ++i) f(i);
 }
 
-using ContactAreas = std::map<std::pair<std::uint32_t, std::uint32_t>, double>;
-
-void setNeighbours(std::vector<NamedPiece>& pieces, const ContactAreas& areas) {
-  for (NamedPiece& piece : pieces) piece.neighbours.clear();
-  for (const auto& [pair, area] : areas) {
-    pieces[pair.first].neighbours.push_back({pair.second, area});
-    pieces[pair.second].neighbours.push_back({pair.first, area});
-  }
-  for (NamedPiece& piece : pieces)
-    std::sort(piece.neighbours.begin(), piece.neighbours.end(),
-              [](const PieceContact& a, const PieceContact& b) { return a.piece < b.piece; });
-}
-
 /// Contacts by inner triangles of the same place, up to rounding.
-void findNeighbours(std::vector<NamedPiece>& pieces) {
+void findNeighbours(std::vector<Piece>& pieces) {
   // A direction, no longer than 1, across which no model has many points.
   constexpr Vec3d kAcross{0.8417, 0.4273, 0.3291};
   struct Triangle {
@@ -178,50 +129,32 @@ void findNeighbours(std::vector<NamedPiece>& pieces) {
       areas[std::minmax(a.piece, b.piece)] += a.area;
     }
   }
-  setNeighbours(pieces, areas);
+  detail::setNeighbours(pieces, areas);
 }
 
-/// The same knives for a level set. Of equal solids there is one.
-LevelSetCutOptions levelSetOptions(const BrickGrid& level, const MeshCutOptions& options,
-                                   const Progress& progress) {
-  LevelSetCutOptions result{
-      .planes = options.planes, .cells = options.cells, .kerf = options.kerf, .rough = options.rough};
-  for (std::size_t i = 0; i < options.solids.size(); ++i) {
-    const Mesh& solid = options.solids[i];
-    std::size_t same = 0;
-    while (options.solids[same].positions != solid.positions || options.solids[same].corners != solid.corners)
-      ++same;
-    result.knives.push_back(same < i ? result.knives[same]
-                                     : solidKnife(solid, double(level.voxelSize), options.kerf, progress));
-  }
-  if (options.minVolume > 0) result.minVolume = options.minVolume;
-  return result;
-}
-
-Result cutPart(const CutPart& part, const MeshCutOptions& options, const Progress& progress) {
-  MeshPieces cut = part.level ? cutLevelSet(*part.level, part.mesh,
-                                            levelSetOptions(*part.level, options, progress), progress)
-                              : cutMesh(part.mesh, options, progress);
-  Result result{.slivers = cut.slivers, .sliverVolume = cut.sliverVolume};
-  const MassProperties whole = massProperties(part.mesh);
-  result.volume = whole.volume;
-  for (MeshPiece& piece : cut.pieces)
-    result.pieces.push_back({.mesh = std::move(piece.mesh),
-                             .code = std::move(piece.code),
-                             .cell = piece.cell,
-                             .mass = piece.mass,
-                             .boxMin = piece.boxMin,
-                             .boxMax = piece.boxMax,
-                             .neighbours = std::move(piece.neighbours)});
-  nameThem(result.pieces, part);
-  // A cut takes volume away, or adds two faces.
+/// Whether a cut has left a piece as it was: it takes volume away, or adds two faces.
+bool isUncut(const Piece& piece, const CutPart& part) {
   const auto isSame = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); };
-  if (part.parent && result.pieces.size() == 1 && isSame(result.pieces[0].mass.volume, whole.volume) &&
-      isSame(result.pieces[0].mass.area, whole.area)) {
-    result.pieces[0].name = part.name;
-    result.pieces[0].parent = *part.parent;
-    result.pieces[0].mesh = part.mesh;
+  const MassProperties whole = massProperties(part.mesh);
+  return isSame(piece.mass.volume, whole.volume) && isSame(piece.mass.area, whole.area);
+}
+
+/// Names the pieces of a part. A part of an earlier cut keeps name and mesh if nothing has touched it.
+void nameThem(Pieces& pieces, const CutPart& part, bool isUntouched) {
+  if (!part.parent || !isUntouched) {
+    nameThem(pieces.pieces, part);
+    return;
   }
+  pieces.pieces[0].name = part.name;
+  pieces.pieces[0].parent = *part.parent;
+  pieces.pieces[0].mesh = part.mesh;
+}
+
+Pieces cutPart(const CutPart& part, const Knives& knives, const CutOptions& options,
+               const Progress& progress) {
+  Pieces result = part.level ? detail::cutLevelSet(*part.level, part.mesh, knives, options, progress)
+                             : cutIntoMeshes(part.mesh, knives, options, progress);
+  nameThem(result, part, part.parent && result.pieces.size() == 1 && isUncut(result.pieces[0], part));
   return result;
 }
 
@@ -245,19 +178,19 @@ std::size_t groupInnerFaces(Mesh& mesh, const ScalarField& shape, float depth) {
                    mesh.corners.begin() + std::ptrdiff_t(3 * f + 3));
   mesh.corners = std::move(corners);
   const auto first = std::uint32_t(inner - order.begin());
-  if (first < count) mesh.groups.push_back({kInside, first, std::uint32_t(count) - first});
+  if (first < count) mesh.groups.push_back({kInsideGroup, first, std::uint32_t(count) - first});
   return count - first;
 }
 
 /// Contacts of level-set pieces: what is a voxel in front of inner triangles.
-void findNeighboursOfLevelSets(std::vector<NamedPiece>& pieces, const Progress& progress) {
+void findNeighboursOfLevelSets(std::vector<Piece>& pieces, const Progress& progress) {
   std::vector<std::map<std::uint32_t, double>> seen(pieces.size());
   parallelFor(
       pieces.size(), 1,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
-          const NamedPiece& piece = pieces[p];
-          const double reach = double(piece.level->voxelSize);
+          const Piece& piece = pieces[p];
+          const double reach = double(piece.level->voxelSize());
           std::vector<std::uint32_t> near;
           for (std::uint32_t q = 0; q < pieces.size(); ++q) {
             const Vec3d gap = max(pieces[q].boxMin - piece.boxMax, piece.boxMin - pieces[q].boxMax);
@@ -269,8 +202,8 @@ void findNeighboursOfLevelSets(std::vector<NamedPiece>& pieces, const Progress& 
             if (area == 0) return;
             const Vec3f front(middleOf(piece.mesh, f) + normal * (0.75 * reach / (2 * area)));
             for (const std::uint32_t q : near) {
-              const BrickGrid& level = *pieces[q].level;
-              const Vec3f v = level.worldToIndex(front);
+              const PieceLevelSet& level = *pieces[q].level;
+              const Vec3f v = front * (1 / level.voxelSize());
               const auto nearest = [](float c) { return int(std::lround(c)); };
               if (!(level.at({nearest(v.x), nearest(v.y), nearest(v.z)}) > 0)) continue;
               seen[p][q] += area;
@@ -283,72 +216,50 @@ void findNeighboursOfLevelSets(std::vector<NamedPiece>& pieces, const Progress& 
   ContactAreas areas;
   for (std::uint32_t p = 0; p < pieces.size(); ++p)
     for (const auto& [q, area] : seen[p]) areas[std::minmax(p, q)] += area / 2;
-  setNeighbours(pieces, areas);
+  detail::setNeighbours(pieces, areas);
 }
 
-Result cutLevel(const CutPart& part, CutOptions options, const Progress& progress) {
+Pieces cutLevel(const CutPart& part, float voxelSize, const Knives& knives, const CutOptions& options,
+                const Progress& progress) {
   require(part.level != nullptr, fmt::format("cut: '{}' has no level set", part.name));
   const ScalarField shape = gridField(part.level);
-  options.box = boundingBox(part.mesh);
-  Pieces cut = cutIntoPieces(shape, options, progress);
-  Result result{.volume = signedVolume(part.mesh), .slivers = cut.slivers, .sliverVolume = cut.sliverVolume};
-  std::vector<std::size_t> innerFaces(cut.pieces.size());
-  result.pieces.resize(cut.pieces.size());
+  Pieces result = cutIntoLevelSets(shape, {.voxelSize = voxelSize, .box = boundingBox(part.mesh)}, knives,
+                                   options, progress);
+  std::vector<std::size_t> innerFaces(result.pieces.size());
   progress.begin("mesh");
   parallelFor(
-      cut.pieces.size(), 1,
+      result.pieces.size(), 1,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-          NamedPiece& piece = result.pieces[i];
-          piece.level = cut.pieces[i].level.toBricks();
-          piece.code = std::move(cut.pieces[i].code);
-          piece.cell = cut.pieces[i].cell;
-          piece.mesh = marchingCubes(*piece.level);
-          innerFaces[i] = groupInnerFaces(piece.mesh, shape, 0.5f * options.voxelSize);
-          setMeasures(piece);
+          Piece& piece = result.pieces[i];
+          piece.mesh = marchingCubes(*piece.level->toBricks());
+          innerFaces[i] = groupInnerFaces(piece.mesh, shape, 0.5f * voxelSize);
+          detail::measure(piece);
         }
       },
       progress);
-  nameThem(result.pieces, part);
-  if (part.parent && result.pieces.size() == 1 && cut.slivers == 0 && innerFaces[0] == 0) {
-    NamedPiece& piece = result.pieces[0];
-    piece.name = part.name;
-    piece.parent = *part.parent;
-    piece.mesh = part.mesh;
-    setMeasures(piece);
-  }
+  const bool isUntouched = result.pieces.size() == 1 && result.slivers == 0 && innerFaces[0] == 0;
+  nameThem(result, part, isUntouched);
+  if (isUntouched) detail::measure(result.pieces[0]);
+  result.volumeOriginal = signedVolume(part.mesh);
   return result;
-}
-
-void checkClosed(std::vector<NamedPiece>& pieces, const Progress& progress) {
-  parallelFor(
-      pieces.size(), 16,
-      [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) pieces[i].closed = isClosed(pieces[i].mesh);
-      },
-      progress);
 }
 
 }  // namespace
 
-Knife solidKnife(const Mesh& solid, double voxelSize, float kerf, const Progress& progress) {
-  const double band = 0.5 * double(kerf) + 4 * voxelSize;
-  return {
-      meshDistance(solid, {.voxelSize = voxelSize, .exteriorBand = band, .interiorBand = band}, progress)};
-}
-
-PieceSet cutParts(std::span<const CutPart> parts, const MeshCutOptions& options, const Progress& progress) {
+Pieces cutIntoMeshes(std::span<const CutPart> parts, const Knives& knives, const CutOptions& options,
+                     const Progress& progress) {
   requireNames(parts);
-  std::vector<Result> results(parts.size());
+  std::vector<Pieces> results(parts.size());
   if (parts.size() == 1) {
-    results[0] = cutPart(parts[0], options, progress);
+    results[0] = cutPart(parts[0], knives, options, progress);
   } else {
     progress.begin("cut");
     parallelFor(
         parts.size(), 1,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) try {
-              results[i] = cutPart(parts[i], options, silent());
+              results[i] = cutPart(parts[i], knives, options, silent());
             } catch (const Cancelled&) {
               throw;
             } catch (const Error& error) {
@@ -357,21 +268,23 @@ PieceSet cutParts(std::span<const CutPart> parts, const MeshCutOptions& options,
         },
         progress);
   }
-  PieceSet set = gathered(std::move(results));
-  if (parts.size() > 1 && !set.pieces.empty()) findNeighbours(set.pieces);
-  checkClosed(set.pieces, progress);
-  return set;
+  Pieces pieces = gathered(std::move(results));
+  if (parts.size() > 1 && !pieces.pieces.empty()) findNeighbours(pieces.pieces);
+  detail::checkClosed(pieces.pieces, progress);
+  return pieces;
 }
 
-PieceSet cutPartsAsLevelSets(std::span<const CutPart> parts, const CutOptions& options,
-                             const Progress& progress) {
+Pieces cutIntoLevelSets(std::span<const CutPart> parts, double voxelSize, const Knives& knives,
+                        const CutOptions& options, const Progress& progress) {
   requireNames(parts);
-  std::vector<Result> results;
-  for (const CutPart& part : parts) results.push_back(cutLevel(part, options, progress));
-  PieceSet set = gathered(std::move(results));
-  if (options.kerf == 0) findNeighboursOfLevelSets(set.pieces, progress);
-  checkClosed(set.pieces, progress);
-  return set;
+  std::vector<Pieces> results;
+  const Knives fields{.cells = knives.cells, .fields = asFields(knives, voxelSize, options.kerf, progress)};
+  for (const CutPart& part : parts)
+    results.push_back(cutLevel(part, float(voxelSize), fields, options, progress));
+  Pieces pieces = gathered(std::move(results));
+  if (options.kerf == 0) findNeighboursOfLevelSets(pieces.pieces, progress);
+  detail::checkClosed(pieces.pieces, progress);
+  return pieces;
 }
 
 }  // namespace nephele

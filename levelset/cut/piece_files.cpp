@@ -20,6 +20,7 @@
 #include <system_error>
 
 #include "nephele/levelset/cut/detail/piece_folder.h"
+#include "nephele/levelset/cut/detail/piece_measures.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/obj_text.h"
 #include "nephele/levelset/mesh/mesh_band.h"
@@ -36,7 +37,6 @@ using detail::PieceFolder;
 using detail::TextWriter;
 using nlohmann::json;
 
-constexpr const char* kInside = "inside";
 constexpr const char* kMaterials = "pieces.mtl";
 constexpr const char* kAll = "pieces.obj";
 constexpr const char* kExploded = "exploded.obj";
@@ -86,17 +86,17 @@ struct PieceText {
 Mesh withMaterials(const Mesh& mesh) {
   Mesh result = mesh;
   for (MeshGroup& group : result.groups)
-    if (group.name == kInside)
-      group.material = kInside;
+    if (group.name == detail::kInsideGroup)
+      group.material = detail::kInsideGroup;
     else if (group.material.empty())
       group.material = "outside";
   return result;
 }
 
 /// Statements that name the files of materials.
-std::string libraries(const PieceSet& set, const std::string& folder) {
+std::string libraries(const Pieces& pieces, const std::string& folder) {
   std::set<std::string> files;
-  for (const NamedPiece& piece : set.pieces)
+  for (const Piece& piece : pieces.pieces)
     for (const std::string& file : piece.mesh.materialFiles)
       if (fs::path(file).filename() != kMaterials) files.insert(file);
   std::string text = fmt::format("mtllib {}\n", kMaterials);
@@ -110,22 +110,22 @@ std::string libraries(const PieceSet& set, const std::string& folder) {
 
 class PieceWriter {
  public:
-  PieceWriter(const PieceSet& set, const PieceFilesOptions& options)
-      : set_(set), options_(options), folder_(options.folder) {
+  PieceWriter(const Pieces& pieces, const PieceFilesOptions& options)
+      : pieces_(pieces), options_(options), folder_(options.folder) {
     const char* extension = options.format == PieceFilesOptions::Format::obj ? ".obj" : ".ply";
-    for (const NamedPiece& piece : set.pieces) names_.push_back(piece.name + extension);
+    for (const Piece& piece : pieces.pieces) names_.push_back(piece.name + extension);
     for (const char* name : {kMaterials, kAll}) names_.push_back(name);
     if (options.explode) names_.push_back(kExploded);
     if (options.levelSetVoxelSize) names_.push_back(kLevelSets);
     names_.push_back(PieceFolder::kList);
     folder_.expect(names_);
-    libraries_ = libraries(set, options.folder);
+    libraries_ = libraries(pieces, options.folder);
   }
 
   std::vector<std::string> write(const Progress& progress) {
-    std::vector<PieceText> texts(set_.pieces.size());
+    std::vector<PieceText> texts(pieces_.pieces.size());
     writePieces(texts, progress);
-    std::size_t next = set_.pieces.size();
+    std::size_t next = pieces_.pieces.size();
     writeText(folder_.temporary(next), names_[next], std::vector<std::string_view>{kMaterialText});
     writeAll(++next, texts);
     if (options_.explode) writeExploded(++next, texts, progress);
@@ -141,12 +141,12 @@ class PieceWriter {
  private:
   void writePieces(std::vector<PieceText>& texts, const Progress& progress) {
     std::vector<std::uint64_t> points(1, 0);
-    for (const NamedPiece& piece : set_.pieces) points.push_back(points.back() + piece.mesh.positions.size());
+    for (const Piece& piece : pieces_.pieces) points.push_back(points.back() + piece.mesh.positions.size());
     parallelFor(
-        set_.pieces.size(), 4,
+        pieces_.pieces.size(), 4,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
-            const Mesh mesh = withMaterials(set_.pieces[i].mesh);
+            const Mesh mesh = withMaterials(pieces_.pieces[i].mesh);
             TextWriter pointText;
             texts[i].uv = detail::writeObjPoints(pointText, mesh);
             texts[i].points = pointText.take();
@@ -157,7 +157,7 @@ class PieceWriter {
             }
             TextWriter faces;
             detail::writeObjFaces(faces, mesh, texts[i].uv, {.groups = true, .materials = true});
-            const std::string head = fmt::format("{}o {}\n", libraries_, set_.pieces[i].name);
+            const std::string head = fmt::format("{}o {}\n", libraries_, pieces_.pieces[i].name);
             writeText(temporary, names_[i],
                       std::vector<std::string_view>{head, texts[i].points, faces.kept()});
           }
@@ -167,11 +167,11 @@ class PieceWriter {
     std::vector<std::uint64_t> coordinates(1, 0);
     for (const PieceText& text : texts) coordinates.push_back(coordinates.back() + text.uv.count);
     parallelFor(
-        set_.pieces.size(), 4,
+        pieces_.pieces.size(), 4,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
             TextWriter faces;
-            detail::writeObjFaces(faces, withMaterials(set_.pieces[i].mesh), texts[i].uv,
+            detail::writeObjFaces(faces, withMaterials(pieces_.pieces[i].mesh), texts[i].uv,
                                   {.groups = false, .materials = true}, points[i], coordinates[i]);
             texts[i].faces = faces.take();
           }
@@ -182,7 +182,7 @@ class PieceWriter {
   /// All pieces in one file, an object and a group each.
   void writeAll(std::size_t index, const std::vector<PieceText>& texts) {
     std::vector<std::string> heads;
-    for (const NamedPiece& piece : set_.pieces) heads.push_back(fmt::format("o {0}\ng {0}\n", piece.name));
+    for (const Piece& piece : pieces_.pieces) heads.push_back(fmt::format("o {0}\ng {0}\n", piece.name));
     std::vector<std::string_view> parts{libraries_};
     for (std::size_t i = 0; i < texts.size(); ++i)
       parts.insert(parts.end(), {heads[i], texts[i].points, texts[i].faces});
@@ -191,13 +191,13 @@ class PieceWriter {
 
   /// Moved points, the same faces. (Texture coordinates stand among the points.)
   void writeExploded(std::size_t index, std::vector<PieceText>& texts, const Progress& progress) {
-    const std::vector<Vec3d> offsets = explodedOffsets(set_, *options_.explode);
+    const std::vector<Vec3d> offsets = explodedOffsets(pieces_, *options_.explode);
     parallelFor(
         texts.size(), 4,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
             TextWriter points;
-            detail::writeObjPoints(points, set_.pieces[i].mesh, offsets[i]);
+            detail::writeObjPoints(points, pieces_.pieces[i].mesh, offsets[i]);
             texts[i].points = points.take();
           }
         },
@@ -207,14 +207,14 @@ class PieceWriter {
 
   void writeLevelSets(std::size_t index, const Progress& progress) {
     const double voxelSize = *options_.levelSetVoxelSize;
-    std::vector<std::optional<VdbGrid>> grids(set_.pieces.size());
+    std::vector<std::optional<VdbGrid>> grids(pieces_.pieces.size());
     parallelFor(
         grids.size(), 1,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
-            const NamedPiece& piece = set_.pieces[i];
-            std::shared_ptr<const BrickGrid> level = piece.level;
-            if (!level) level = levelOf(piece.mesh, voxelSize);
+            const Piece& piece = pieces_.pieces[i];
+            const std::shared_ptr<const BrickGrid> level =
+                piece.level ? piece.level->toBricks() : levelOf(piece.mesh, voxelSize);
             grids[i] = toVdb(*level, {piece.name, VdbGridInfo::Class::levelSet});
           }
         },
@@ -242,28 +242,28 @@ class PieceWriter {
     head["cells"] = json::array();
     for (const Vec3f& p : options_.cells) head["cells"].push_back({p.x, p.y, p.z});
     head["files"] = names_;
-    head["volume_original"] = set_.volumeOriginal;
-    head["volume_sum"] = set_.volumeSum;
-    head["slivers"] = {{"count", set_.slivers}, {"volume", set_.sliverVolume}};
+    head["volume_original"] = pieces_.volumeOriginal;
+    head["volume_sum"] = pieces_.volumeSum;
+    head["slivers"] = {{"count", pieces_.slivers}, {"volume", pieces_.sliverVolume}};
     // A line for each piece.
     constexpr auto kReplace = json::error_handler_t::replace;
     std::string text = "{\n";
     for (const auto& [key, value] : head.items())
       text += fmt::format("  {}: {},\n", json(key).dump(), value.dump(-1, ' ', false, kReplace));
     text += "  \"pieces\": [\n";
-    for (std::size_t i = 0; i < set_.pieces.size(); ++i)
+    for (std::size_t i = 0; i < pieces_.pieces.size(); ++i)
       text += fmt::format("    {}{}\n", describe(i).dump(-1, ' ', false, kReplace),
-                          i + 1 < set_.pieces.size() ? "," : "");
+                          i + 1 < pieces_.pieces.size() ? "," : "");
     text += "  ]\n}\n";
     writeText(folder_.temporary(index), names_[index], std::vector<std::string_view>{text});
   }
 
   json describe(std::size_t i) const {
-    const NamedPiece& piece = set_.pieces[i];
+    const Piece& piece = pieces_.pieces[i];
     const auto vector = [](const Vec3d& v) { return json{v.x, v.y, v.z}; };
     json neighbours = json::array();
     for (const PieceContact& contact : piece.neighbours)
-      neighbours.push_back({{"name", set_.pieces[contact.piece].name}, {"area", contact.area}});
+      neighbours.push_back({{"name", pieces_.pieces[contact.piece].name}, {"area", contact.area}});
     const auto& m = piece.mass.inertia;
     json result = {{"name", piece.name},
                    {"file", names_[i]},
@@ -279,7 +279,7 @@ class PieceWriter {
     return result;
   }
 
-  const PieceSet& set_;
+  const Pieces& pieces_;
   const PieceFilesOptions& options_;
   PieceFolder folder_;
   std::vector<std::string> names_;
@@ -310,19 +310,19 @@ bool isPieceName(const std::string& name) {
   return true;
 }
 
-std::vector<Vec3d> explodedOffsets(const PieceSet& set, double explode) {
+std::vector<Vec3d> explodedOffsets(const Pieces& pieces, double explode) {
   Vec3d centre{};
-  for (const NamedPiece& piece : set.pieces)
-    centre += piece.mass.centroid * (piece.mass.volume / set.volumeSum);
+  for (const Piece& piece : pieces.pieces)
+    centre += piece.mass.centroid * (piece.mass.volume / pieces.volumeSum);
   std::vector<Vec3d> offsets;
-  for (const NamedPiece& piece : set.pieces) offsets.push_back((piece.mass.centroid - centre) * explode);
+  for (const Piece& piece : pieces.pieces) offsets.push_back((piece.mass.centroid - centre) * explode);
   return offsets;
 }
 
-std::vector<std::string> writePieces(const PieceSet& set, const PieceFilesOptions& options,
+std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptions& options,
                                      const Progress& progress) {
-  require(!set.pieces.empty(), "there are no pieces to write");
-  return PieceWriter(set, options).write(progress);
+  require(!pieces.pieces.empty(), "there are no pieces to write");
+  return PieceWriter(pieces, options).write(progress);
 }
 
 std::vector<CutPart> readPieces(const std::string& folder, const Progress& progress) {

@@ -29,7 +29,7 @@ struct PieceFilesOptions {
 };
 
 /// How far each piece moves, so that its centroid is 1 + `explode` times as far from the centroid of all.
-std::vector<Vec3d> explodedOffsets(const PieceSet& set, double explode);
+std::vector<Vec3d> explodedOffsets(const Pieces& pieces, double explode);
 
 /// Writes pieces to a folder, which is made if it is not there: a mesh of each, `NAME.obj` or `NAME.ply`;
 /// `pieces.obj`, all of them as objects; `pieces.mtl`, the materials of outer and inner faces;
@@ -39,7 +39,7 @@ std::vector<Vec3d> explodedOffsets(const PieceSet& set, double explode);
 /// earlier pieces.json in the folder lists are replaced or removed; no others are touched.
 /// @throws Error naming the path; also where the folder holds files that are in the way: of the same names,
 /// or meshes named like pieces, which no pieces.json lists. Cancelled.
-std::vector<std::string> writePieces(const PieceSet& set, const PieceFilesOptions& options,
+std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptions& options,
                                      const Progress& progress = silent());
 
 /// The pieces that a folder holds, as parts for another cut: those that its pieces.json lists, or all its

@@ -10,7 +10,6 @@
 #include "nephele/levelset/cut/detail/cut_kernels.h"
 #include "nephele/levelset/grid/memory_chunks.h"
 #include "nephele/levelset/mesh/brick_volume.h"
-#include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/field_node.h"
 
@@ -37,7 +36,7 @@ class PieceLevelSetNode final : public FieldNode<float> {
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch&) const override {
     for (int i = 0; i < points.count; ++i) values[0][i] = valueAt({points.x[i], points.y[i], points.z[i]});
   }
-  Interval range(const Box&, RangeMemo&) const override { return {-level_.band(), level_.band()}; }
+  Interval range(const Box& box, RangeMemo&) const override;
   float differenceStep() const override { return level_.voxelSize(); }
 
  private:
@@ -72,6 +71,54 @@ class PieceLevelSetNode final : public FieldNode<float> {
   float toIndex_;
 };
 
+/// The range of the samples around the box if it meets few bricks; of larger ones whether they hold samples.
+Interval PieceLevelSetNode::range(const Box& box, RangeMemo&) const {
+  const float band = level_.band();
+  const BrickBox& bricks = level_.table_->bricks;
+  // One brick around the table, for what is beyond it.
+  const Vec3i least = (bricks.first - Vec3i{1, 1, 1}) * kBrick;
+  const Vec3i most = (bricks.first + bricks.count + Vec3i{1, 1, 1}) * kBrick - Vec3i{1, 1, 1};
+  Vec3i low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    // As the values: products of floats, off by as much as a rounded product is.
+    constexpr double kRounding = 1e-6;
+    const double a = double(box.min[axis]) * double(toIndex_), b = double(box.max[axis]) * double(toIndex_);
+    if (!(a <= b)) return {-band, band};
+    const double first = std::floor(a - kRounding * std::abs(a)),
+                 last = std::floor(b + kRounding * std::abs(b)) + 1;
+    low[axis] = int(std::clamp(first, double(least[axis]), double(most[axis])));
+    high[axis] = int(std::clamp(last, double(least[axis]), double(most[axis])));
+  }
+  constexpr std::size_t kFew = 27;
+  const BrickBox around{brickOf(low), brickOf(high) - brickOf(low) + Vec3i{1, 1, 1}};
+  Interval range{band, -band};
+  const auto include = [&](float v) { range = {std::min(range.min, v), std::max(range.max, v)}; };
+  for (std::size_t i = 0; i < around.size() && !(range.min == -band && range.max == band); ++i) {
+    const Vec3i brick = around.at(i);
+    const std::int32_t entry = level_.table_->entryAt(brick);
+    if (entry != PieceLevelSet::kInside) include(-band);
+    if (entry != PieceLevelSet::kOutside) include(band);
+  }
+  if (around.size() > kFew || range.isPoint()) return range;
+  range = {band, -band};
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const Vec3i brick = around.at(i), first = max(low - brick * kBrick, Vec3i{}),
+                last = min(high - brick * kBrick, Vec3i{kBrick - 1, kBrick - 1, kBrick - 1});
+    const std::int32_t entry = level_.table_->entryAt(brick);
+    if (entry <= PieceLevelSet::kInside) {
+      include(entry == PieceLevelSet::kInside ? band : -band);
+      continue;
+    }
+    const float* samples = level_.samplesOf(entry);
+    for (int z = first.z; z <= last.z; ++z)
+      for (int y = first.y; y <= last.y; ++y)
+        for (int x = first.x; x <= last.x; ++x) include(samples[offsetIn({x, y, z})]);
+  }
+  // What rounding adds to a blend.
+  const float beyond = 2e-6f * band;
+  return {std::max(range.min - beyond, -band), std::min(range.max + beyond, band)};
+}
+
 }  // namespace detail
 
 PieceLevelSet::PieceLevelSet(float voxelSize, float band, Table table,
@@ -103,12 +150,10 @@ float PieceLevelSet::at(const Vec3i& voxel) const {
 }
 
 ScalarField PieceLevelSet::field() const {
-  require(table_ != nullptr, "PieceLevelSet: holds nothing");
   return ScalarField(std::make_shared<detail::PieceLevelSetNode>(*this));
 }
 
 double PieceLevelSet::volume() const {
-  require(table_ != nullptr, "PieceLevelSet: holds nothing");
   // By table entry and by place among the bricks that hold samples, which come after the two ends.
   std::vector<const float*> samples(2);
   std::vector<detail::BrickMask> inside{{}, detail::BrickMask::all()};
@@ -156,7 +201,6 @@ double PieceLevelSet::volume() const {
 }
 
 std::shared_ptr<BrickGrid> PieceLevelSet::toBricks() const {
-  require(table_ != nullptr, "PieceLevelSet: holds nothing");
   auto grid = std::make_shared<BrickGrid>();
   grid->indexToWorld.linear = Mat3f::scaling(voxelSize_);
   grid->worldToIndex.linear = Mat3f::scaling(1 / voxelSize_);

@@ -37,7 +37,6 @@ class PieceLevelSet {
     }
   };
 
-  PieceLevelSet() = default;
   PieceLevelSet(float voxelSize, float band, Table table, std::shared_ptr<const detail::LargeArray> bricks);
 
   float voxelSize() const { return voxelSize_; }

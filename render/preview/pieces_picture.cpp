@@ -97,7 +97,7 @@ Mesh facesOf(const Mesh& mesh, const std::vector<std::uint32_t>& faces, const Ve
 }
 
 /// Outer and inner faces of a piece as objects.
-void addObjects(const NamedPiece& piece, const Vec3d& offset, const Vec3f& colour,
+void addObjects(const Piece& piece, const Vec3d& offset, const Vec3f& colour,
                 std::vector<SurfaceObject>& objects) {
   const Mesh mesh = triangulated(piece.mesh);
   std::vector<std::uint32_t> faces[2];
@@ -156,19 +156,19 @@ std::vector<Vec3f> pieceColours(std::span<const std::vector<PieceContact>> neigh
   return colours;
 }
 
-Image picturePieces(const PieceSet& set, const PiecesPictureOptions& options, const Progress& progress) {
-  require(!set.pieces.empty(), "picture of pieces: there are none");
+Image picturePieces(const Pieces& pieces, const PiecesPictureOptions& options, const Progress& progress) {
+  require(!pieces.pieces.empty(), "picture of pieces: there are none");
   std::vector<std::vector<PieceContact>> neighbours;
   std::vector<double> sizes;
-  for (const NamedPiece& piece : set.pieces) {
+  for (const Piece& piece : pieces.pieces) {
     neighbours.push_back(piece.neighbours);
     sizes.push_back(piece.mass.volume);
   }
   const std::vector<Vec3f> colours = pieceColours(neighbours, sizes);
-  const std::vector<Vec3d> offsets = explodedOffsets(set, options.explode);
+  const std::vector<Vec3d> offsets = explodedOffsets(pieces, options.explode);
   std::vector<SurfaceObject> objects;
-  for (std::size_t i = 0; i < set.pieces.size(); ++i)
-    addObjects(set.pieces[i], offsets[i], colours[i], objects);
+  for (std::size_t i = 0; i < pieces.pieces.size(); ++i)
+    addObjects(pieces.pieces[i], offsets[i], colours[i], objects);
   return pictureSurfaces(std::move(objects),
                          {.width = options.width,
                           .height = options.height,

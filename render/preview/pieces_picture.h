@@ -28,7 +28,7 @@ std::vector<Vec3f> pieceColours(std::span<const std::vector<PieceContact>> neigh
 /// light of a lamp and a sky, and what faces throw on each other. Channels R, G, B, A, linear, opaque. The
 /// same at any number of threads.
 /// @throws Error if there are no pieces or an option is outside its range; Cancelled.
-Image picturePieces(const PieceSet& set, const PiecesPictureOptions& options,
+Image picturePieces(const Pieces& pieces, const PiecesPictureOptions& options,
                     const Progress& progress = silent());
 
 }  // namespace nephele

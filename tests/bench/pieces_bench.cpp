@@ -12,8 +12,6 @@
 #include <filesystem>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/levelset/cut/cut_into_level_sets.h"
-#include "nephele/levelset/cut/cut_level_set.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
@@ -58,23 +56,21 @@ void levelSet(benchmark::State& state) {
     benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl());
 }
 
-void cut(benchmark::State& state, const CutOptions& options) {
+PieceLattice lattice() {
+  return {.voxelSize = voxel(), .box = box()};
+}
+
+void cut(benchmark::State& state, const Knives& knives) {
   level();
   Pieces pieces;
-  for (auto _ : state) pieces = cutIntoPieces(level(), options);
+  for (auto _ : state) pieces = cutIntoLevelSets(level(), lattice(), knives);
   state.SetItemsProcessed(state.iterations() * std::int64_t(pieces.pieces.size()));
   state.counters["pieces"] = double(pieces.pieces.size());
   state.SetLabel(fmt::format("{} pieces of {} codes", pieces.pieces.size(), pieces.codes));
 }
 
-CutOptions options() {
-  return {.voxelSize = voxel(), .box = box()};
-}
-
 void planes(benchmark::State& state) {
-  CutOptions all = options();
-  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
-  cut(state, all);
+  cut(state, {.planes = blades(state.range(0))});
 }
 
 RoughnessOptions roughness() {
@@ -82,10 +78,14 @@ RoughnessOptions roughness() {
   return {.amplitude = 0.01f * size, .noise = {.frequency = 4 / size}};
 }
 
+std::vector<RoughBlade> rough(std::int64_t count) {
+  std::vector<RoughBlade> all;
+  for (const BladePlane& blade : blades(count)) all.push_back({blade, roughness()});
+  return all;
+}
+
 void roughPlanes(benchmark::State& state) {
-  CutOptions all = options();
-  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(roughKnife(blade, roughness()));
-  cut(state, all);
+  cut(state, {.rough = rough(state.range(0))});
 }
 
 std::vector<Vec3f> scattered(std::int64_t count) {
@@ -93,14 +93,12 @@ std::vector<Vec3f> scattered(std::int64_t count) {
 }
 
 void cells(benchmark::State& state) {
-  CutOptions all = options();
-  all.cells = scattered(state.range(0));
-  cut(state, all);
+  cut(state, {.cells = scattered(state.range(0))});
 }
 
-void exactCut(benchmark::State& state, const MeshCutOptions& options) {
-  MeshPieces pieces;
-  for (auto _ : state) pieces = cutMesh(source(), options);
+void exactCut(benchmark::State& state, const Knives& knives) {
+  Pieces pieces;
+  for (auto _ : state) pieces = cutIntoMeshes(source(), knives);
   state.SetItemsProcessed(state.iterations() * std::int64_t(pieces.pieces.size()));
   state.counters["pieces"] = double(pieces.pieces.size());
   state.SetLabel(fmt::format("{} pieces", pieces.pieces.size()));
@@ -111,9 +109,7 @@ void exactPlanes(benchmark::State& state) {
 }
 
 void exactRough(benchmark::State& state) {
-  MeshCutOptions options;
-  for (const BladePlane& blade : blades(state.range(0))) options.rough.push_back({blade, roughness()});
-  exactCut(state, options);
+  exactCut(state, {.rough = rough(state.range(0))});
 }
 
 void exactBall(benchmark::State& state) {
@@ -139,10 +135,10 @@ void corefinedCells(benchmark::State& state) {
   double apart = 0;
   std::int64_t done = 0;
   for (auto _ : state) {
-    MeshPieces pieces;
-    const double ours = secondsOf([&] { pieces = cutMesh(source(), {.cells = points}); });
+    Pieces pieces;
+    const double ours = secondsOf([&] { pieces = cutIntoMeshes(source(), {.cells = points}); });
     std::vector<double> volumes(points.size());
-    for (const MeshPiece& piece : pieces.pieces) volumes[*piece.cell] += piece.mass.volume;
+    for (const Piece& piece : pieces.pieces) volumes[*piece.cell] += piece.mass.volume;
     std::int64_t used = 0, clipped = 0;
     double theirs = 0;
     for (std::uint32_t i = 0; i < points.size(); ++i) {
@@ -165,8 +161,7 @@ void corefinedCells(benchmark::State& state) {
 /// Splitting in turn with making the level set: from the level set and the knives to all pieces' level sets
 /// as fields, one of whose values each is read; and once more with the volume of each.
 void splitAgainstLevelSet(benchmark::State& state) {
-  CutOptions all = options();
-  for (const BladePlane& blade : blades(state.range(0))) all.knives.push_back(flatKnife(blade));
+  const Knives knives{.planes = blades(state.range(0))};
   level();
   const Vec3f middle = box().center();
   std::vector<double> ratios, processorRatios, withVolumes;
@@ -179,16 +174,16 @@ void splitAgainstLevelSet(benchmark::State& state) {
     const std::clock_t between = std::clock();
     Pieces cut;
     const double split = secondsOf([&] {
-      cut = cutIntoPieces(level(), all);
-      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level.field()(middle));
+      cut = cutIntoLevelSets(level(), lattice(), knives);
+      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level->field()(middle));
     });
     processorRatios.push_back(double(std::clock() - between) / double(between - start));
     const double measured = secondsOf([&] {
-      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level.volume());
+      for (const Piece& piece : cut.pieces) benchmark::DoNotOptimize(piece.level->volume());
     });
     withVolumes.push_back((split + measured) / made);
     bytes = 0, count = cut.pieces.size();
-    for (const Piece& piece : cut.pieces) bytes += piece.level.memoryBytes();
+    for (const Piece& piece : cut.pieces) bytes += piece.level->memoryBytes();
     state.SetIterationTime(split);
     ratios.push_back(split / made);
   }
@@ -204,19 +199,19 @@ void splitAgainstLevelSet(benchmark::State& state) {
 }
 
 /// A level set by linear cells, in turn with its marching cubes mesh, cut as a mesh.
-void levelSetCells(benchmark::State& state, const LevelSetCutOptions& options, const MeshCutOptions& same) {
+void levelSetCells(benchmark::State& state, const Knives& knives) {
   const auto grid = toBricks(meshToLevelSet(source(), {.voxelSize = double(voxel())}));
-  const auto trianglesOf = [](const MeshPieces& cut) {
+  const auto trianglesOf = [](const Pieces& cut) {
     std::size_t count = 0;
-    for (const MeshPiece& piece : cut.pieces) count += piece.mesh.faceCount();
+    for (const Piece& piece : cut.pieces) count += piece.mesh.faceCount();
     return count;
   };
-  MeshPieces cells, meshes;
+  Pieces cells, meshes;
   std::vector<double> ratios;
   for (auto _ : state) {
-    const double ours = secondsOf([&] { cells = cutLevelSet(*grid, options); });
+    const double ours = secondsOf([&] { cells = cutIntoMeshes(*grid, knives); });
     state.SetIterationTime(ours);
-    ratios.push_back(ours / secondsOf([&] { meshes = cutMesh(marchingCubes(*grid), same); }));
+    ratios.push_back(ours / secondsOf([&] { meshes = cutIntoMeshes(marchingCubes(*grid), knives); }));
   }
   std::sort(ratios.begin(), ratios.end());
   state.SetItemsProcessed(state.iterations() * std::int64_t(cells.pieces.size()));
@@ -226,14 +221,11 @@ void levelSetCells(benchmark::State& state, const LevelSetCutOptions& options, c
 }
 
 void levelSetCellsPlanes(benchmark::State& state) {
-  const auto flat = blades(state.range(0));
-  levelSetCells(state, {.planes = flat}, {.planes = flat});
+  levelSetCells(state, {.planes = blades(state.range(0))});
 }
 
 void levelSetCellsRough(benchmark::State& state) {
-  std::vector<RoughBlade> rough;
-  for (const BladePlane& blade : blades(state.range(0))) rough.push_back({blade, roughness()});
-  levelSetCells(state, {.rough = rough}, {.rough = rough});
+  levelSetCells(state, {.rough = rough(state.range(0))});
 }
 
 void planeCounts(benchmark::internal::Benchmark* bench) {

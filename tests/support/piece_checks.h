@@ -13,9 +13,9 @@
 
 namespace nephele::test {
 
-inline double volumeSum(const MeshPieces& cut) {
+inline double volumeSum(const Pieces& cut) {
   double sum = cut.sliverVolume;
-  for (const MeshPiece& piece : cut.pieces) sum += piece.mass.volume;
+  for (const Piece& piece : cut.pieces) sum += piece.mass.volume;
   return sum;
 }
 
@@ -46,9 +46,9 @@ inline const MeshAttribute& attributeOf(const Mesh& mesh, const std::string& nam
 
 /// Closed manifold pieces facing outwards, of the volume of the source together, whose inner faces each lie
 /// on one of another piece, point by point.
-inline void expectSound(const Mesh& source, const MeshPieces& cut) {
+inline void expectSound(const Mesh& source, const Pieces& cut) {
   double inside = 0, contact = 0;
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold()) << topologyOf(piece.mesh);
     EXPECT_GT(piece.mass.volume, 0);
     EXPECT_NEAR(signedVolume(piece.mesh), piece.mass.volume, 1e-9 * signedVolume(source));
@@ -64,14 +64,13 @@ inline void expectSound(const Mesh& source, const MeshPieces& cut) {
 
 /// The largest difference between texture coordinates of outer faces, at random points of every `stride`-th
 /// of them, and those of the source there. `checked` counts the points.
-inline double worstTexture(const Mesh& source, const MeshPieces& cut, std::size_t stride,
-                           std::size_t& checked) {
+inline double worstTexture(const Mesh& source, const Pieces& cut, std::size_t stride, std::size_t& checked) {
   const MeshAttribute& sourceUv = attributeOf(source, "uv");
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0.05, 0.9);
   checked = 0;
   double worst = 0;
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
     for (std::size_t f = random() % stride; f < firstInside(piece.mesh); f += stride) {
       double w[3] = {unit(random), unit(random), unit(random)};

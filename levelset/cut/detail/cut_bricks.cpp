@@ -118,14 +118,14 @@ struct SampledBlock {
 class Sampler {
  public:
   /// `grid` holds the samples of `shape`, or is null.
-  Sampler(const ScalarField& shape, const BrickGrid* grid, const CutOptions& options, SampledBlock& block)
+  Sampler(const ScalarField& shape, const BrickGrid* grid, const CutPlan& plan, SampledBlock& block)
       : shape_(shape),
         grid_(grid),
-        options_(options),
+        plan_(plan),
         block_(block),
-        h_(options.voxelSize),
-        band_(options.bandVoxels * options.voxelSize),
-        halfKerf_(options.kerf / 2) {}
+        h_(plan.lattice.voxelSize),
+        band_(plan.band()),
+        halfKerf_(plan.halfKerf()) {}
 
   /// `samples` has room for them.
   void add(const Candidate& candidate, float* samples) {
@@ -160,7 +160,7 @@ class Sampler {
     for (const std::uint32_t knife : known.undecided) {
       samples += kSamples;
       for (std::size_t half = 0; half < 2; ++half)
-        evaluateKnife(options_.knives[knife], points.blocks[half], samples + half * kBlockSize, scratch);
+        evaluateKnife(plan_.knives[knife], points.blocks[half], samples + half * kBlockSize, scratch);
       split(knife, samples);
     }
     if (!known.cells.empty()) splitByCell(known, points);
@@ -192,14 +192,14 @@ class Sampler {
       std::size_t nearest = 0;
       float least = std::numeric_limits<float>::infinity();
       for (std::size_t c = 0; c < count; ++c) {
-        const Vec3f away = options_.cells[known.cells[c]] - p;
+        const Vec3f away = plan_.cells[known.cells[c]] - p;
         if (const float squared = dot(away, away); squared < least) least = squared, nearest = c;
       }
       std::vector<Bisector>& sides = around[nearest];
       if (sides.empty())
         for (const std::uint32_t other : known.cells)
           if (other != known.cells[nearest])
-            sides.emplace_back(options_.cells[known.cells[nearest]], options_.cells[other]);
+            sides.emplace_back(plan_.cells[known.cells[nearest]], plan_.cells[other]);
       if (std::all_of(sides.begin(), sides.end(),
                       [&](const Bisector& side) { return side.at(p) > halfKerf_; }))
         ofCell[nearest].add(int(s));
@@ -214,7 +214,7 @@ class Sampler {
 
   const ScalarField& shape_;
   const BrickGrid* grid_;
-  const CutOptions& options_;
+  const CutPlan& plan_;
   SampledBlock& block_;
   float h_, band_, halfKerf_;
   std::vector<OpenMember> open_, next_;
@@ -264,13 +264,13 @@ class CodeNumbers {
 
 class Walk {
  public:
-  Walk(const ScalarField& shape, const CutOptions& options, const Progress& progress)
+  Walk(const ScalarField& shape, const CutPlan& plan, const Progress& progress)
       : shape_(shape),
-        options_(options),
+        plan_(plan),
         progress_(progress),
-        h_(options.voxelSize),
-        band_(options.bandVoxels * options.voxelSize),
-        halfKerf_(options.kerf / 2) {}
+        h_(plan.lattice.voxelSize),
+        band_(plan.band()),
+        halfKerf_(plan.halfKerf()) {}
 
   CutBricks run() {
     findCandidates();
@@ -281,7 +281,7 @@ class Walk {
 
  private:
   void findCandidates() {
-    const Box box = options_.box.expanded(band_);
+    const Box box = plan_.lattice.box.expanded(band_);
     const float width = h_ * kBrick;
     const auto brickOfPoint = [width](const Vec3f& p) {
       return Vec3i{int(std::floor(p.x / width)), int(std::floor(p.y / width)), int(std::floor(p.z / width))};
@@ -325,11 +325,11 @@ class Walk {
 
   const CutKnowledge* knowNothing() {
     MemoryChunks& chunks = chunks_.emplace_back();
-    const auto none = chunks.take<std::uint64_t>((options_.knives.size() + 63) / 64);
+    const auto none = chunks.take<std::uint64_t>((plan_.knives.size() + 63) / 64);
     std::fill(none.begin(), none.end(), 0);
-    const auto knives = chunks.take<std::uint32_t>(options_.knives.size());
+    const auto knives = chunks.take<std::uint32_t>(plan_.knives.size());
     std::iota(knives.begin(), knives.end(), 0u);
-    const auto cells = chunks.take<std::uint32_t>(options_.cells.size());
+    const auto cells = chunks.take<std::uint32_t>(plan_.cells.size());
     std::iota(cells.begin(), cells.end(), 0u);
     return &(chunks.take<CutKnowledge>(1)[0] = {none, none, knives, cells});
   }
@@ -368,7 +368,7 @@ class Walk {
     std::size_t kept = 0;
     for (std::size_t u = 0; u < before.undecided.size(); ++u) {
       const std::uint32_t k = before.undecided[u];
-      const Knife& knife = options_.knives[k];
+      const Knife& knife = plan_.knives[k];
       const float reach = knife.steepest * (band_ + halfKerf_);
       const Interval range = knife.field.range(box);
       const bool isAbove = range.min > reach;
@@ -395,12 +395,12 @@ class Walk {
                                            MemoryChunks& chunks) const {
     const Vec3f centre = box.center();
     float nearest = std::numeric_limits<float>::infinity();
-    for (const std::uint32_t c : cells) nearest = std::min(nearest, length(options_.cells[c] - centre));
+    for (const std::uint32_t c : cells) nearest = std::min(nearest, length(plan_.cells[c] - centre));
     // Farther than the nearest point from everywhere in the box by twice the band: its boundary is not near.
     const float reach = (nearest + length(box.size()) + 2 * (band_ + halfKerf_)) * (1 + 1e-5f);
     std::vector<std::uint32_t> near;
     for (const std::uint32_t c : cells)
-      if (!(length(options_.cells[c] - centre) > reach)) near.push_back(c);
+      if (!(length(plan_.cells[c] - centre) > reach)) near.push_back(c);
     return near.size() == cells.size() ? cells : chunks.copyOf(std::span<const std::uint32_t>(near));
   }
 
@@ -417,7 +417,7 @@ class Walk {
     parallelFor(
         candidates_.size(), kBricksPerTask,
         [&](std::size_t begin, std::size_t end) {
-          Sampler sampler(shape_, grid.get(), options_, blocks[begin / kBricksPerTask]);
+          Sampler sampler(shape_, grid.get(), plan_, blocks[begin / kBricksPerTask]);
           for (std::size_t i = begin; i < end; ++i)
             sampler.add(candidates_[i], result.samples.data() + candidates_[i].firstSample);
         },
@@ -446,7 +446,7 @@ class Walk {
   }
 
   const ScalarField& shape_;
-  const CutOptions& options_;
+  const CutPlan& plan_;
   const Progress& progress_;
   float h_, band_, halfKerf_;
   std::vector<MemoryChunks> chunks_;
@@ -466,8 +466,8 @@ void evaluateKnife(const Knife& knife, const PointSpans& points, std::span<float
   divideBySlope(values, {slopes[0].data(), slopes[1].data(), slopes[2].data()});
 }
 
-CutBricks cutBricks(const ScalarField& shape, const CutOptions& options, const Progress& progress) {
-  return Walk(shape, options, progress).run();
+CutBricks cutBricks(const ScalarField& shape, const CutPlan& plan, const Progress& progress) {
+  return Walk(shape, plan, progress).run();
 }
 
 }  // namespace nephele::detail

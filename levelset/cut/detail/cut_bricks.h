@@ -3,12 +3,24 @@
 #include <span>
 #include <vector>
 
-#include "nephele/levelset/cut/cut_into_level_sets.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/memory_chunks.h"
 
-/// The first half of cutting: which brick knows what. Not for other folders.
+/// The first half of cutting into level sets: which brick knows what.
 namespace nephele::detail {
+
+/// A cut into level sets: all knives are fields.
+struct CutPlan {
+  PieceLattice lattice;
+  std::vector<Knife> knives;
+  std::vector<Vec3f> cells;
+  float kerf = 0.0f;
+
+  /// World units.
+  float band() const { return lattice.bandVoxels * lattice.voxelSize; }
+  float halfKerf() const { return kerf / 2; }
+};
 
 inline bool bitOf(std::span<const std::uint64_t> bits, std::uint32_t k) {
   return (bits[k / 64] >> (k % 64) & 1) != 0;
@@ -88,6 +100,6 @@ void evaluateKnife(const Knife& knife, const PointSpans& points, std::span<float
 
 /// Every brick whose samples come within the band of the shape or lie inside it.
 /// @throws Error if the box is too large for its voxels; Cancelled.
-CutBricks cutBricks(const ScalarField& shape, const CutOptions& options, const Progress& progress);
+CutBricks cutBricks(const ScalarField& shape, const CutPlan& plan, const Progress& progress);
 
 }  // namespace nephele::detail

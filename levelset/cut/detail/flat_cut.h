@@ -8,12 +8,13 @@
 
 namespace nephele::detail {
 
-/// @throws Error if planes, cells, kerf or minVolume of the options are out of range.
-void requireFlatKnives(const MeshCutOptions& options);
+/// @throws Error if kerf, least volume, planes, cells or the slopes of fields are out of range.
+void requireKnives(const Knives& knives, const CutOptions& options);
 
-/// The pieces that planes and cells make of the parts of a source; other knives have made the parts.
+/// The pieces that planes and cells, which must be in range, make of the parts of a source; other knives have
+/// made the parts.
 /// @throws Cancelled.
-MeshPieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts,
-                    const MeshCutOptions& options, const Progress& progress);
+Pieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts, const Knives& flat,
+                const CutOptions& options, const Progress& progress);
 
 }  // namespace nephele::detail

@@ -314,16 +314,16 @@ double windingNumber(std::span<const Vec3d> positions, std::span<const TriangleI
   return sum / (2 * M_PI);
 }
 
-std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSource& solid) {
-  const double half = double(options.kerf) / 2;
+std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid) {
+  const double half = double(kerf) / 2;
   const std::size_t perKnife = half == 0 ? 1 : 2;
-  std::vector<KnifeSheet> sheets(perKnife * options.rough.size());
-  if (!options.rough.empty()) {
+  std::vector<KnifeSheet> sheets(perKnife * knives.rough.size());
+  if (!knives.rough.empty()) {
     const Probe probe(solid);
-    parallelFor(options.rough.size(), 1, [&](std::size_t begin, std::size_t end) {
+    parallelFor(knives.rough.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) {
         const std::string name = fmt::format("rough blade {}", k);
-        const HeightField field(options.rough[k], solid.low(), solid.high(), name);
+        const HeightField field(knives.rough[k], solid.low(), solid.high(), name);
         for (std::size_t s = 0; s < perKnife; ++s) {
           HeightField side = field;
           if (half != 0) side.raise(s == 0 ? -half : half);
@@ -332,10 +332,10 @@ std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSour
       }
     });
   }
-  auto knife = std::uint32_t(options.rough.size());
-  for (std::size_t k = 0; k < options.solids.size(); ++k, ++knife) {
+  auto knife = std::uint32_t(knives.rough.size());
+  for (std::size_t k = 0; k < knives.solids.size(); ++k, ++knife) {
     const std::string name = fmt::format("solid {}", k);
-    const CutSource blade(options.solids[k], name);
+    const CutSource blade(knives.solids[k], name);
     const auto& positions = blade.positions();
     const auto& triangles = blade.triangles();
     if (half == 0) {
@@ -349,8 +349,7 @@ std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSour
       mesh.positions = moved;
       for (const TriangleIndices& t : triangles) mesh.addFace(t);
       require(signedVolume(mesh) > 0 && countSelfIntersections(mesh).value_or(0) == 0,
-              fmt::format("cut: a kerf of {} is too wide for {}: its sides cross themselves", options.kerf,
-                          name));
+              fmt::format("cut: a kerf of {} is too wide for {}: its sides cross themselves", kerf, name));
       sheets.push_back(sheetOf(moved, triangles, name, knife));
     }
   }

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/cut/cut.h"
+#include "nephele/levelset/cut/knives.h"
 #include "nephele/levelset/mesh/triangle_tree.h"
 
 namespace nephele::detail {
@@ -38,7 +38,7 @@ class CutSource;
 /// The sheets of all rough blades and solids of a cut; of blades, what is in and near the solid that is cut.
 /// @throws Error if a knife's options are out of range, a solid is open, inside out or not finite, or a kerf
 /// is so wide that a solid's sides cross themselves.
-std::vector<KnifeSheet> knifeSheets(const MeshCutOptions& options, const CutSource& solid);
+std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid);
 
 /// How often a closed surface winds around a point, not on it. Cost: linear.
 double windingNumber(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,

@@ -20,7 +20,7 @@ struct Surfaces {
 };
 
 /// Part of a triangle that was given, `parent`, and facing the same way.
-struct Facet {
+struct ArrangedFacet {
   std::uint32_t parent = 0;
   TriangleIndices vertices{};
 };
@@ -29,7 +29,7 @@ struct Arrangement {
   /// Those that were given come first.
   std::vector<Vec3d> positions;
   /// By parent. Facets of different surfaces meet in whole edges only, or have the same three vertices.
-  std::vector<Facet> facets;
+  std::vector<ArrangedFacet> facets;
   /// Per triangle that was given: whether one of another surface touches it in its plane.
   std::vector<bool> isInPlane;
 };

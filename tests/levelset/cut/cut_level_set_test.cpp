@@ -1,5 +1,3 @@
-#include "nephele/levelset/cut/cut_level_set.h"
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -9,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "nephele/levelset/cut/cut.h"
+#include "nephele/levelset/cut/marching_tetrahedra.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -129,7 +129,7 @@ TEST(MarchingTetrahedra, RefuseWhatHasNoSurface) {
   const auto outside = denseGrid(
       {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return -1; }, {}, -1.0f);
   EXPECT_EQ(marchingTetrahedra(*outside).faceCount(), 0u);
-  EXPECT_THROW(cutLevelSet(*outside, {}), Error);
+  EXPECT_THROW(cutIntoMeshes(*outside, {}), Error);
 }
 
 TEST(LevelSetPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
@@ -137,7 +137,7 @@ TEST(LevelSetPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
   const Mesh whole = marchingTetrahedra(*level);
   for (const int n : {1, 3, 5, 8}) {
     const auto blades = randomBlades({.count = n, .box = kBall, .throughCentre = true});
-    const MeshPieces cut = cutLevelSet(*level, {.planes = blades});
+    const Pieces cut = cutIntoMeshes(*level, {.planes = blades});
     EXPECT_EQ(cut.pieces.size(), std::size_t(n * n - n + 2));
     expectSound(whole, cut);
     EXPECT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 1e-10);
@@ -148,7 +148,7 @@ TEST(LevelSetPieces, CutFacesLieOnTheirKnivesAndOuterOnesOnTheLevelSet) {
   const auto level = ball(40);
   const double h = double(level->voxelSize);
   const auto blades = randomBlades({.count = 5, .box = kBall, .seed = 1});
-  for (const MeshPiece& piece : cutLevelSet(*level, {.planes = blades}).pieces) {
+  for (const Piece& piece : cutIntoMeshes(*level, {.planes = blades}).pieces) {
     for (std::size_t f = 0; f < piece.mesh.faceCount(); ++f)
       for (const std::uint32_t v : piece.mesh.face(f)) {
         const Vec3d& p = piece.mesh.positions[v];
@@ -164,26 +164,26 @@ TEST(LevelSetPieces, CutFacesLieOnTheirKnivesAndOuterOnesOnTheLevelSet) {
 TEST(LevelSetPieces, APlaneThroughSamplesHalvesABall) {
   const auto level = ball(25);
   const Mesh whole = marchingTetrahedra(*level);
-  const MeshPieces cut = cutLevelSet(*level, {.planes = {{{0, 0, 0}, {1, 0, 0}}}});
+  const Pieces cut = cutIntoMeshes(*level, {.planes = {{{0, 0, 0}, {1, 0, 0}}}});
   expectSound(whole, cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     // The tetrahedra are symmetric about the centre.
     EXPECT_NEAR(piece.mass.volume, signedVolume(whole) / 2, 1e-7);
     EXPECT_NEAR(piece.mass.volume, 2 * M_PI / 3, 0.01);
     EXPECT_NEAR(insideArea(piece.mesh), M_PI, 0.01);
   }
   // The same plane as any other field: made of triangles of the lattice, in the same place.
-  const MeshPieces field = cutLevelSet(*level, {.knives = {flatKnife({{0, 0, 0}, {1, 0, 0}})}});
+  const Pieces field = cutIntoMeshes(*level, {.fields = {flatKnife({{0, 0, 0}, {1, 0, 0}})}});
   ASSERT_EQ(field.pieces.size(), 2u);
   expectSound(whole, field);
-  for (const MeshPiece& piece : field.pieces) EXPECT_NEAR(piece.mass.volume, signedVolume(whole) / 2, 1e-7);
+  for (const Piece& piece : field.pieces) EXPECT_NEAR(piece.mass.volume, signedVolume(whole) / 2, 1e-7);
 }
 
 TEST(LevelSetPieces, AKnifeThatMissesLeavesOnePiece) {
   const auto level = ball(16);
-  const MeshPieces cut =
-      cutLevelSet(*level, {.planes = {{{0, 3, 0}, {0, 1, 0}}}, .knives = {Knife(sphere({5, 0, 0}, 1))}});
+  const Pieces cut =
+      cutIntoMeshes(*level, {.planes = {{{0, 3, 0}, {0, 1, 0}}}, .fields = {Knife(sphere({5, 0, 0}, 1))}});
   ASSERT_EQ(cut.pieces.size(), 1u);
   EXPECT_EQ(cut.pieces[0].code.sides, (std::vector<bool>{false, false}));
   EXPECT_NEAR(cut.pieces[0].mass.volume, signedVolume(marchingTetrahedra(*level)), 1e-11);
@@ -194,13 +194,12 @@ TEST(LevelSetPieces, KnivesThatCoincideCutOnce) {
   const BladePlane plane{{0.1f, 0, 0}, {1, 0.3f, 0}};
   const RoughBlade rough{plane, {.amplitude = 0.05f, .noise = {.frequency = 2}}};
   const Knife tool(sphere({0, 1, 0}, 0.7f));
-  for (const LevelSetCutOptions& options :
-       {LevelSetCutOptions{.planes = {plane, plane}}, LevelSetCutOptions{.rough = {rough, rough}},
-        LevelSetCutOptions{.knives = {tool, tool}}}) {
-    const MeshPieces cut = cutLevelSet(*level, options);
+  for (const Knives& knives :
+       {Knives{.planes = {plane, plane}}, Knives{.rough = {rough, rough}}, Knives{.fields = {tool, tool}}}) {
+    const Pieces cut = cutIntoMeshes(*level, knives);
     ASSERT_EQ(cut.pieces.size(), 2u);
     EXPECT_EQ(cut.slivers, 0u);
-    for (const MeshPiece& piece : cut.pieces) EXPECT_EQ(piece.code.sides[0], piece.code.sides[1]);
+    for (const Piece& piece : cut.pieces) EXPECT_EQ(piece.code.sides[0], piece.code.sides[1]);
     expectSound(marchingTetrahedra(*level), cut);
   }
 }
@@ -208,8 +207,8 @@ TEST(LevelSetPieces, KnivesThatCoincideCutOnce) {
 TEST(LevelSetPieces, AKnifeMayCoincideWithTheSurface) {
   // Refused by cutMesh, which has to bring two meshes together.
   const auto level = ball(16);
-  for (const MeshPieces& cut : {cutLevelSet(*level, {.knives = {gridField(level)}}),
-                                cutLevelSet(*level, {.knives = {Knife(sphere({0, 0, 0}, 1))}})}) {
+  for (const Pieces& cut : {cutIntoMeshes(*level, {.fields = {gridField(level)}}),
+                            cutIntoMeshes(*level, {.fields = {Knife(sphere({0, 0, 0}, 1))}})}) {
     ASSERT_EQ(cut.pieces.size(), 1u);
     EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{true});
     EXPECT_NEAR(cut.pieces[0].mass.volume, signedVolume(marchingTetrahedra(*level)), 1e-6);
@@ -218,10 +217,10 @@ TEST(LevelSetPieces, AKnifeMayCoincideWithTheSurface) {
 
 TEST(LevelSetPieces, ABallCutsOutALens) {
   const auto level = ball(40);
-  const MeshPieces cut = cutLevelSet(*level, {.knives = {Knife(sphere({1, 0, 0}, 1))}});
+  const Pieces cut = cutIntoMeshes(*level, {.fields = {Knife(sphere({1, 0, 0}, 1))}});
   expectSound(marchingTetrahedra(*level), cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
-  const MeshPiece& lens = cut.pieces[1];
+  const Piece& lens = cut.pieces[1];
   EXPECT_EQ(lens.code.sides, std::vector<bool>{true});
   EXPECT_NEAR(lens.mass.volume, 5 * M_PI / 12, 0.002 * 5 * M_PI / 12);  // two caps of height 1/2
   EXPECT_NEAR(lens.neighbours[0].area, M_PI, 0.005 * M_PI);             // a cap: 2 pi r h
@@ -239,9 +238,9 @@ TEST(LevelSetPieces, ABallCutsOutALens) {
 }
 
 /// How far vertices of inner faces, off the outer surface of the ball, lie from a blade with a kerf, voxels.
-double farthestFromBlade(const MeshPieces& cut, const Knife& knife, float kerf, double voxel) {
+double farthestFromBlade(const Pieces& cut, const Knife& knife, float kerf, double voxel) {
   double worst = 0;
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     std::array<std::vector<float>, 3> points, slopes;
     for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f)
       for (const std::uint32_t v : piece.mesh.face(f))
@@ -267,9 +266,10 @@ TEST(LevelSetPieces, VerticesOfCurvedBladesLieOnThem) {
   const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2}}};
   const Knife hills = roughKnife(rough.plane, rough.roughness), tool(sphere({0, 0, 0}, 0.5f));
   for (const float kerf : {0.0f, 0.05f * level->voxelSize, 0.5f * level->voxelSize}) {
-    EXPECT_LT(farthestFromBlade(cutLevelSet(*level, {.kerf = kerf, .rough = {rough}}), hills, kerf, voxel),
-              1e-3);
-    EXPECT_LT(farthestFromBlade(cutLevelSet(*level, {.kerf = kerf, .knives = {tool}}), tool, kerf, voxel),
+    EXPECT_LT(
+        farthestFromBlade(cutIntoMeshes(*level, {.rough = {rough}}, {.kerf = kerf}), hills, kerf, voxel),
+        1e-3);
+    EXPECT_LT(farthestFromBlade(cutIntoMeshes(*level, {.fields = {tool}}, {.kerf = kerf}), tool, kerf, voxel),
               1e-3);
   }
 }
@@ -279,12 +279,11 @@ TEST(LevelSetPieces, SidesOfANarrowKerfDoNotMeet) {
   const auto level = ball(16);
   const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}},
                          {.amplitude = 0.12f, .noise = {.frequency = 2, .seed = 1}}};
-  const MeshPieces cut = cutLevelSet(
-      *level,
-      {.kerf = 0.01f * level->voxelSize, .rough = {rough}, .knives = {Knife(sphere({0.1f, 0, 0}, 0.4f))}});
+  const Pieces cut = cutIntoMeshes(*level, {.rough = {rough}, .fields = {Knife(sphere({0.1f, 0, 0}, 0.4f))}},
+                                   {.kerf = 0.01f * level->voxelSize});
   ASSERT_GT(cut.pieces.size(), 2u);
   Mesh all;
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     EXPECT_EQ(countSelfIntersections(piece.mesh), 0u);
     const auto first = std::uint32_t(all.positions.size());
     all.positions.insert(all.positions.end(), piece.mesh.positions.begin(), piece.mesh.positions.end());
@@ -299,10 +298,10 @@ TEST(LevelSetPieces, SidesOfANarrowKerfDoNotMeet) {
 TEST(LevelSetPieces, VoronoiCellsAreThose) {
   const auto level = ball(24);
   const auto points = scatteredPoints(sphere({0, 0, 0}, 0.9f), kBall, 12, 1);
-  const MeshPieces cut = cutLevelSet(*level, {.cells = points});
+  const Pieces cut = cutIntoMeshes(*level, {.cells = points});
   expectSound(marchingTetrahedra(*level), cut);
   EXPECT_EQ(cut.pieces.size(), 12u);
-  for (const MeshPiece& piece : cut.pieces)
+  for (const Piece& piece : cut.pieces)
     for (const Vec3d& p : piece.mesh.positions)
       for (const Vec3f& other : points)
         EXPECT_LE(length(p - Vec3d(points[*piece.cell])), length(p - Vec3d(other)) + 1e-9);
@@ -314,13 +313,12 @@ TEST(LevelSetPieces, AKerfTakesItsWidthTimesTheArea) {
   const float kerf = 0.04f;
   const RoughBlade rough{{{0, 0, 0}, {0.2f, 1, 0}}, {.amplitude = 0.03f, .noise = {.frequency = 1.5f}}};
   const Knife tool(sphere({0, 0, 0}, 0.6f));
-  const auto taken = [&](LevelSetCutOptions options) {
+  const auto taken = [&](const Knives& knives) {
     double area = 0;
-    for (const MeshPiece& piece : cutLevelSet(*level, options).pieces) area += insideArea(piece.mesh) / 2;
-    options.kerf = kerf;
-    const MeshPieces cut = cutLevelSet(*level, options);
+    for (const Piece& piece : cutIntoMeshes(*level, knives).pieces) area += insideArea(piece.mesh) / 2;
+    const Pieces cut = cutIntoMeshes(*level, knives, {.kerf = kerf});
     EXPECT_EQ(cut.pieces.size(), 2u);
-    for (const MeshPiece& piece : cut.pieces) {
+    for (const Piece& piece : cut.pieces) {
       EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
       EXPECT_TRUE(piece.neighbours.empty());
     }
@@ -328,29 +326,29 @@ TEST(LevelSetPieces, AKerfTakesItsWidthTimesTheArea) {
   };
   EXPECT_NEAR(taken({.planes = {{{0, 0.2f, 0}, {0, 1, 1}}}}), 1, 0.01);
   EXPECT_NEAR(taken({.rough = {rough}}), 1, 0.01);
-  EXPECT_NEAR(taken({.knives = {tool}}), 1, 0.01);
+  EXPECT_NEAR(taken({.fields = {tool}}), 1, 0.01);
   EXPECT_NEAR(taken({.cells = {{-0.5f, 0, 0}, {0.5f, 0.1f, 0}}}), 1, 0.01);
 }
 
 TEST(LevelSetPieces, PermutedKnivesMakeTheSameBits) {
   const auto level = ball(20);
-  LevelSetCutOptions options{
+  Knives knives{
       .planes = randomBlades({.count = 4, .box = kBall, .throughCentre = true, .seed = 3}),
       .cells = scatteredPoints(sphere({0, 0, 0}, 0.9f), kBall, 4, 1),
       .rough = {{{{0, 0, 0}, {1, 0, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2}}},
                 {{{0, 0, 0}, {0, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 2, .seed = 1}}}},
-      .knives = {Knife(sphere({0, 0, 1}, 0.7f)), Knife(sphere({0, 0, -1}, 0.5f)),
+      .fields = {Knife(sphere({0, 0, 1}, 0.7f)), Knife(sphere({0, 0, -1}, 0.5f)),
                  Knife(sphere({0, 1, 0}, 1))}};
-  const MeshPieces cut = cutLevelSet(*level, options);
-  std::reverse(options.planes.begin(), options.planes.end());
-  std::reverse(options.cells.begin(), options.cells.end());
-  std::reverse(options.rough.begin(), options.rough.end());
-  std::rotate(options.knives.begin(), options.knives.begin() + 1, options.knives.end());
-  const MeshPieces other = cutLevelSet(*level, options);
+  const Pieces cut = cutIntoMeshes(*level, knives);
+  std::reverse(knives.planes.begin(), knives.planes.end());
+  std::reverse(knives.cells.begin(), knives.cells.end());
+  std::reverse(knives.rough.begin(), knives.rough.end());
+  std::rotate(knives.fields.begin(), knives.fields.begin() + 1, knives.fields.end());
+  const Pieces other = cutIntoMeshes(*level, knives);
   ASSERT_EQ(cut.pieces.size(), other.pieces.size());
   EXPECT_GT(cut.pieces.size(), 50u);
   for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
-    const MeshPiece &a = cut.pieces[i], &b = other.pieces[i];
+    const Piece &a = cut.pieces[i], &b = other.pieces[i];
     EXPECT_EQ(a.mesh.positions, b.mesh.positions);
     EXPECT_EQ(a.mesh.corners, b.mesh.corners);
     EXPECT_EQ(attributeOf(a.mesh, "uv").values, attributeOf(b.mesh, "uv").values);
@@ -362,11 +360,11 @@ TEST(LevelSetPieces, PermutedKnivesMakeTheSameBits) {
 
 TEST(LevelSetPieces, AreTheSameAtAnyNumberOfThreads) {
   const auto level = ball(24);
-  const LevelSetCutOptions options{.planes = randomBlades({.count = 3, .box = kBall}),
-                                   .knives = {Knife(sphere({0, 0, 1}, 0.7f))}};
-  const MeshPieces many = cutLevelSet(*level, options);
+  const Knives knives{.planes = randomBlades({.count = 3, .box = kBall}),
+                      .fields = {Knife(sphere({0, 0, 1}, 0.7f))}};
+  const Pieces many = cutIntoMeshes(*level, knives);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const MeshPieces alone = cutLevelSet(*level, options);
+  const Pieces alone = cutIntoMeshes(*level, knives);
   ASSERT_EQ(many.pieces.size(), alone.pieces.size());
   for (std::size_t i = 0; i < many.pieces.size(); ++i) {
     EXPECT_EQ(many.pieces[i].mesh.positions, alone.pieces[i].mesh.positions);
@@ -377,9 +375,9 @@ TEST(LevelSetPieces, AreTheSameAtAnyNumberOfThreads) {
 TEST(LevelSetPieces, InnerFacesHaveTheirPlacesAsTextureCoordinates) {
   const auto level = ball(16);
   const RoughBlade rough{{{0, 0.1f, 0}, {0, 1, 0}}, {.amplitude = 0.05f, .noise = {.frequency = 1}}};
-  const MeshPieces cut = cutLevelSet(*level, {.rough = {rough}});
+  const Pieces cut = cutIntoMeshes(*level, {.rough = {rough}});
   ASSERT_EQ(cut.pieces.size(), 2u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
     ASSERT_LT(firstInside(piece.mesh), piece.mesh.faceCount());
     for (std::size_t c = 3 * firstInside(piece.mesh); c < piece.mesh.corners.size(); ++c) {
@@ -395,15 +393,13 @@ TEST(LevelSetPieces, SliversBelowAVoxelAreLeftOutAndCounted) {
   const auto level = ball(10);
   const double voxel = std::pow(double(level->voxelSize), 3);
   // A cap of height 0.02: pi h^2 (1 - h / 3), 1.25 of a thousandth.
-  const LevelSetCutOptions options{.planes = {{{0, 0.985f, 0}, {0, 1, 0}}}};
-  const MeshPieces cut = cutLevelSet(*level, options);
+  const Knives knives{.planes = {{{0, 0.985f, 0}, {0, 1, 0}}}};
+  const Pieces cut = cutIntoMeshes(*level, knives);
   ASSERT_EQ(cut.pieces.size(), 1u);
   EXPECT_EQ(cut.slivers, 1u);
   EXPECT_GT(cut.sliverVolume, 0);
   EXPECT_LT(cut.sliverVolume, voxel);
-  LevelSetCutOptions all = options;
-  all.minVolume = 0.0;
-  EXPECT_EQ(cutLevelSet(*level, all).pieces.size(), 2u);
+  EXPECT_EQ(cutIntoMeshes(*level, knives, {.minVolume = 0.0}).pieces.size(), 2u);
 }
 
 TEST(LevelSetPieces, AreSoundOnAnySamplesByAnyFields) {
@@ -414,13 +410,14 @@ TEST(LevelSetPieces, AreSoundOnAnySamplesByAnyFields) {
     const Mesh whole = marchingTetrahedra(*level);
     if (whole.faceCount() == 0) continue;
     std::mt19937 random(seed);
-    LevelSetCutOptions options{.minVolume = 0.0};
+    Knives knives;
+    CutOptions options{.minVolume = 0.0};
     const int fields = 1 + int(random() % 3);
     for (int k = 0; k < fields; ++k)
-      options.knives.push_back(gridField(randomLattice(std::uint32_t(random()), side)));
+      knives.fields.push_back(gridField(randomLattice(std::uint32_t(random()), side)));
     if (random() % 4 == 0) options.kerf = 0.1f;
-    const MeshPieces cut = cutLevelSet(*level, options);
-    for (const MeshPiece& piece : cut.pieces) {
+    const Pieces cut = cutIntoMeshes(*level, knives, options);
+    for (const Piece& piece : cut.pieces) {
       const Topology topology = topologyOf(piece.mesh);
       ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
       ASSERT_GT(piece.mass.volume, 0) << seed;
@@ -439,18 +436,18 @@ TEST(LevelSetPieces, AreSoundOnAnySamplesByPlanes) {
     const auto level = randomLattice(seed, 3 + int(seed / 4 % 4));
     const Mesh whole = marchingTetrahedra(*level);
     if (whole.faceCount() == 0) continue;
-    LevelSetCutOptions options{.minVolume = 0.0};
-    options.planes = randomBlades({.count = 2, .box = boundingBox(whole), .seed = seed});
-    options.planes.push_back({{0, 7, 0}, {0, 1, 0}});  // through samples
-    const MeshPieces cut = cutLevelSet(*level, options);
-    for (const MeshPiece& piece : cut.pieces) {
+    const CutOptions options{.minVolume = 0.0};
+    Knives knives{.planes = randomBlades({.count = 2, .box = boundingBox(whole), .seed = seed})};
+    knives.planes.push_back({{0, 7, 0}, {0, 1, 0}});  // through samples
+    const Pieces cut = cutIntoMeshes(*level, knives, options);
+    for (const Piece& piece : cut.pieces) {
       const Topology topology = topologyOf(piece.mesh);
       ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
     }
     ASSERT_NEAR(volumeSum(cut) / signedVolume(whole), 1, 1e-10) << seed;
     // Together with fields, whose faces may lie in the plane, surfaces may touch themselves along edges.
-    options.knives.push_back(gridField(randomLattice(seed + 1, 5)));
-    for (const MeshPiece& piece : cutLevelSet(*level, options).pieces)
+    knives.fields.push_back(gridField(randomLattice(seed + 1, 5)));
+    for (const Piece& piece : cutIntoMeshes(*level, knives, options).pieces)
       ASSERT_TRUE(topologyOf(piece.mesh).isClosedManifold())
           << "seed " << seed << ": " << topologyOf(piece.mesh);
   }
@@ -466,14 +463,14 @@ TEST(LevelSetPieces, TheCubeInManyWaysIsWhole) {
   const Mesh whole = marchingTetrahedra(*level);
   const Box box = boundingBox(whole);
   const RoughnessOptions hills{.amplitude = 0.2f, .noise = {.frequency = 0.4f}};
-  std::vector<LevelSetCutOptions> ways;
+  std::vector<Knives> ways;
   for (const int n : {1, 5, 20}) ways.push_back({.planes = randomBlades({.count = n, .box = box})});
   ways.push_back({.cells = scatteredPoints(gridField(level), box, 12, 1)});
   ways.emplace_back();
   for (const BladePlane& blade : randomBlades({.count = 3, .box = box}))
     ways.back().rough.push_back({blade, hills});
-  for (const LevelSetCutOptions& options : ways) {
-    const MeshPieces cut = cutLevelSet(*level, options);
+  for (const Knives& knives : ways) {
+    const Pieces cut = cutIntoMeshes(*level, knives);
     EXPECT_GT(cut.pieces.size(), 1u);
     expectSound(whole, cut);
   }
@@ -486,29 +483,29 @@ TEST(LevelSetPieces, TheBunnyCutByPlanesHillsAndABallIsWhole) {
   const Box box = boundingBox(bunny);
   const float size = box.longestSide();
   const auto level = toBricks(meshToLevelSet(bunny, {.voxelSize = double(size) / 128}));
-  LevelSetCutOptions options{.planes = randomBlades({.count = 2, .box = box}),
-                             .knives = {Knife(sphere(box.center(), 0.2f * size))}};
-  options.rough.push_back(
+  Knives knives{.planes = randomBlades({.count = 2, .box = box}),
+                .fields = {Knife(sphere(box.center(), 0.2f * size))}};
+  knives.rough.push_back(
       {{box.center(), {0, 1, 0}}, {.amplitude = 0.01f * size, .noise = {.frequency = 5 / size}}});
-  const MeshPieces cut = cutLevelSet(*level, options);
+  const Pieces cut = cutIntoMeshes(*level, knives);
   EXPECT_GE(cut.pieces.size(), 12u);
   expectSound(marchingTetrahedra(*level), cut);
 }
 
 TEST(LevelSetPieces, RefuseWhatMakesNoSense) {
   const auto level = ball(8);
-  const auto refused = [&](const LevelSetCutOptions& options) {
-    EXPECT_THROW(cutLevelSet(*level, options), Error);
+  const auto refused = [&](const Knives& knives, const CutOptions& options = {}) {
+    EXPECT_THROW(cutIntoMeshes(*level, knives, options), Error);
   };
   refused({.planes = {{{0, 0, 0}, {0, 0, 0}}}});
   refused({.cells = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}});
-  refused({.kerf = -1});
-  refused({.knives = {Knife(sphere({0, 0, 0}, 1), 0.5f)}});
-  refused({.minVolume = -1.0});
+  refused({}, {.kerf = -1});
+  refused({.fields = {Knife(sphere({0, 0, 0}, 1), 0.5f)}});
+  refused({}, {.minVolume = -1.0});
   struct Stop : Progress {
     bool cancelled() const override { return true; }
   } stop;
-  EXPECT_THROW(cutLevelSet(*level, {}, stop), Cancelled);
+  EXPECT_THROW(cutIntoMeshes(*level, {}, {}, stop), Cancelled);
 }
 
 }  // namespace

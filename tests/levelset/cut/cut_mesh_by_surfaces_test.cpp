@@ -37,30 +37,31 @@ std::vector<RoughBlade> roughBlades(const Mesh& mesh, int count, std::uint32_t s
   return blades;
 }
 
-std::string errorOf(const Mesh& mesh, const MeshCutOptions& options) {
+std::string errorOf(const Mesh& mesh, const Knives& knives, const CutOptions& options) {
   try {
-    cutMesh(mesh, options);
+    cutIntoMeshes(mesh, knives, options);
   } catch (const Error& error) {
     return error.what();
   }
   return "";
 }
 
-void expectError(const Mesh& mesh, const MeshCutOptions& options, const std::string& part) {
-  const std::string message = errorOf(mesh, options);
+void expectError(const Mesh& mesh, const Knives& knives, const std::string& part,
+                 const CutOptions& options = {}) {
+  const std::string message = errorOf(mesh, knives, options);
   EXPECT_NE(message.find(part), std::string::npos) << "got: " << message;
 }
 
-double volumeOn(const MeshPieces& cut, const std::vector<bool>& sides) {
+double volumeOn(const Pieces& cut, const std::vector<bool>& sides) {
   double volume = 0;
-  for (const MeshPiece& piece : cut.pieces)
+  for (const Piece& piece : cut.pieces)
     if (piece.code.sides == sides) volume += piece.mass.volume;
   return volume;
 }
 
 TEST(MeshKnives, ABallTakesALensFromABall) {
   const Mesh ball = icosphere(1, 4), knife = icosphere(0.8, 4, {0.9, 0.2, 0.1});
-  const MeshPieces cut = cutMesh(ball, {.solids = {knife}});
+  const Pieces cut = cutIntoMeshes(ball, {.solids = {knife}});
   expectSound(ball, cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
   EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{false});
@@ -72,7 +73,7 @@ TEST(MeshKnives, ABallTakesALensFromABall) {
       M_PI * (R + r - d) * (R + r - d) * (d * d + 2 * d * (r + R) - 3 * (r - R) * (r - R)) / (12 * d);
   EXPECT_NEAR(cut.pieces[1].mass.volume, lens, 0.006 * lens);
   // What both share is the same, whichever is the knife: the same polyhedron by other faces.
-  const MeshPieces other = cutMesh(knife, {.solids = {ball}});
+  const Pieces other = cutIntoMeshes(knife, {.solids = {ball}});
   ASSERT_EQ(other.pieces.size(), 2u);
   EXPECT_NEAR(other.pieces[1].mass.volume, cut.pieces[1].mass.volume, 1e-13);
   EXPECT_NEAR(insideArea(other.pieces[1].mesh) + insideArea(cut.pieces[1].mesh), cut.pieces[1].mass.area,
@@ -80,7 +81,7 @@ TEST(MeshKnives, ABallTakesALensFromABall) {
 }
 
 TEST(MeshKnives, AKnifeInsideLeavesACavity) {
-  const MeshPieces cut = cutMesh(cube(), {.solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}});
+  const Pieces cut = cutIntoMeshes(cube(), {.solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}});
   expectSound(cube(), cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
   EXPECT_NEAR(cut.pieces[0].mass.volume, 7, 1e-14);
@@ -92,7 +93,7 @@ TEST(MeshKnives, AKnifeInsideLeavesACavity) {
 TEST(MeshKnives, AKnifeThatMissesLeavesTheMeshAsItIs) {
   for (const bool around : {false, true}) {
     const Mesh knife = around ? boxMesh({-2, -2, -2}, {2, 2, 2}) : boxMesh({2, 2, 2}, {3, 3, 3});
-    const MeshPieces cut = cutMesh(cube(), {.rough = {rough({{0, 5, 0}, {0, 1, 0}})}, .solids = {knife}});
+    const Pieces cut = cutIntoMeshes(cube(), {.rough = {rough({{0, 5, 0}, {0, 1, 0}})}, .solids = {knife}});
     ASSERT_EQ(cut.pieces.size(), 1u);
     EXPECT_EQ(cut.pieces[0].code.sides, (std::vector<bool>{false, around}));
     EXPECT_EQ(cut.pieces[0].mesh.faceCount(), 12u);
@@ -128,13 +129,13 @@ TEST(MeshKnives, BoxesOnALatticeCutAsTheirCellsSay) {
     std::vector<Cells> knives(1 + std::size_t(draw(3)));
     for (Cells& knife : knives) knife = drawBox();
     if (draw(3) == 0) knives.push_back(knives[0]);
-    MeshCutOptions options;
-    for (const Cells& knife : knives) options.solids.push_back(boxMesh(at(knife.low), at(knife.high)));
+    Knives cutters;
+    for (const Cells& knife : knives) cutters.solids.push_back(boxMesh(at(knife.low), at(knife.high)));
     const int axis = draw(3), height = draw(4);
     if (seed % 3 == 0) {
       BladePlane plane{Vec3f(at({height, height, height})), {0, 0, 0}};
       plane.normal[axis] = 1;
-      options.planes.push_back(plane);
+      cutters.planes.push_back(plane);
     }
     std::map<std::vector<bool>, double> truth, found;
     for (int z = source.low[2]; z < source.high[2]; ++z)
@@ -142,7 +143,7 @@ TEST(MeshKnives, BoxesOnALatticeCutAsTheirCellsSay) {
         for (int x = source.low[0]; x < source.high[0]; ++x) {
           const std::array<int, 3> cell{x, y, z};
           std::vector<bool> sides;
-          if (!options.planes.empty()) sides.push_back(cell[std::size_t(axis)] >= height);
+          if (!cutters.planes.empty()) sides.push_back(cell[std::size_t(axis)] >= height);
           for (const Cells& knife : knives) {
             bool inside = true;
             for (std::size_t k = 0; k < 3; ++k) inside &= cell[k] >= knife.low[k] && cell[k] < knife.high[k];
@@ -151,9 +152,9 @@ TEST(MeshKnives, BoxesOnALatticeCutAsTheirCellsSay) {
           truth[sides] += scale * scale * scale;
         }
     const Mesh mesh = boxMesh(at(source.low), at(source.high));
-    const MeshPieces cut = cutMesh(mesh, options);
+    const Pieces cut = cutIntoMeshes(mesh, cutters);
     double inside = 0, contact = 0;
-    for (const MeshPiece& piece : cut.pieces) {
+    for (const Piece& piece : cut.pieces) {
       found[piece.code.sides] += piece.mass.volume;
       EXPECT_EQ(topologyOf(piece.mesh).openEdges, 0u);
       inside += insideArea(piece.mesh);
@@ -171,12 +172,12 @@ TEST(MeshKnives, BoxesOnALatticeCutAsTheirCellsSay) {
 TEST(MeshKnives, CoincidentKnivesCutOnce) {
   const Mesh ball = icosphere(1, 3), knife = icosphere(0.7, 3, {0.8, 0.1, 0});
   const RoughBlade blade = rough({{0.1f, 0.2f, 0}, {1, 2, 3}});
-  const MeshPieces once = cutMesh(ball, {.rough = {blade}, .solids = {knife}});
-  const MeshPieces twice = cutMesh(ball, {.rough = {blade, blade}, .solids = {knife, knife}});
+  const Pieces once = cutIntoMeshes(ball, {.rough = {blade}, .solids = {knife}});
+  const Pieces twice = cutIntoMeshes(ball, {.rough = {blade, blade}, .solids = {knife, knife}});
   expectSound(ball, twice);
   ASSERT_EQ(twice.pieces.size(), once.pieces.size());
   EXPECT_EQ(twice.slivers, 0u);
-  for (const MeshPiece& piece : once.pieces) {
+  for (const Piece& piece : once.pieces) {
     const std::vector<bool>& s = piece.code.sides;
     EXPECT_NEAR(volumeOn(twice, {s[0], s[0], s[1], s[1]}), piece.mass.volume, 1e-13);
   }
@@ -184,7 +185,7 @@ TEST(MeshKnives, CoincidentKnivesCutOnce) {
 
 TEST(MeshKnives, ASolidCutByItselfIsOnePiece) {
   const Mesh torus = torusMesh(1, 0.4, 30, 15);
-  const MeshPieces cut = cutMesh(torus, {.solids = {torus}});
+  const Pieces cut = cutIntoMeshes(torus, {.solids = {torus}});
   ASSERT_EQ(cut.pieces.size(), 1u);
   EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{true});
   EXPECT_EQ(insideArea(cut.pieces[0].mesh), 0);
@@ -194,8 +195,8 @@ TEST(MeshKnives, ASolidCutByItselfIsOnePiece) {
 TEST(MeshKnives, ARoughBladeWithoutHillsIsAPlane) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   const BladePlane plane{{0.2f, 0.1f, 0}, {1, 0.5f, 0.25f}};
-  const MeshPieces flat = cutMesh(mesh, {.planes = {plane}});
-  const MeshPieces cut = cutMesh(mesh, {.rough = {rough(plane, 0)}});
+  const Pieces flat = cutIntoMeshes(mesh, {.planes = {plane}});
+  const Pieces cut = cutIntoMeshes(mesh, {.rough = {rough(plane, 0)}});
   expectSound(mesh, cut);
   ASSERT_EQ(cut.pieces.size(), flat.pieces.size());
   for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
@@ -208,10 +209,10 @@ TEST(MeshKnives, ARoughBladeWithoutHillsIsAPlane) {
 TEST(MeshKnives, RoughFacesLieOnTheHillsOfTheRoughKnife) {
   const RoughBlade blade = rough({{0.1f, 0.05f, 0}, {0.3f, 1, 0.2f}}, 0.1f, 1);
   const ScalarField knife = roughKnife(blade.plane, blade.roughness).field;
-  const MeshPieces cut = cutMesh(cube(), {.rough = {blade}});
+  const Pieces cut = cutIntoMeshes(cube(), {.rough = {blade}});
   expectSound(cube(), cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     std::vector<bool> isOuter(piece.mesh.positions.size());
     for (std::size_t f = 0; f < firstInside(piece.mesh); ++f)
       for (const std::uint32_t v : piece.mesh.face(f)) isOuter[v] = true;
@@ -238,11 +239,11 @@ TEST(MeshKnives, RoughFacesLieOnTheHillsOfTheRoughKnife) {
 }
 
 TEST(MeshKnives, AKerfOfPlanesTakesTheSlab) {
-  const MeshPieces cut =
-      cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 1, 0}}, {{0.5f, 0, 0}, {2, 0, 0}}}, .kerf = 0.25f});
+  const Pieces cut =
+      cutIntoMeshes(cube(), {.planes = {{{0, 0, 0}, {0, 1, 0}}, {{0.5f, 0, 0}, {2, 0, 0}}}}, {.kerf = 0.25f});
   ASSERT_EQ(cut.pieces.size(), 4u);
   double volume = 0;
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
     EXPECT_TRUE(piece.neighbours.empty());
     volume += piece.mass.volume;
@@ -257,22 +258,22 @@ TEST(MeshKnives, AKerfOfCellsMovesEveryBisector) {
   std::vector<Vec3f> points;
   for (int i = 0; i < 8; ++i)
     points.push_back({i & 1 ? 0.5f : -0.5f, i & 2 ? 0.5f : -0.5f, i & 4 ? 0.5f : -0.5f});
-  const MeshPieces cut = cutMesh(cube(), {.cells = points, .kerf = 0.25f});
+  const Pieces cut = cutIntoMeshes(cube(), {.cells = points}, {.kerf = 0.25f});
   ASSERT_EQ(cut.pieces.size(), 8u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
     EXPECT_NEAR(piece.mass.volume, 0.875 * 0.875 * 0.875, 1e-14);
   }
 }
 
 TEST(MeshKnives, AKerfOfASolidMovesItsFaces) {
-  const MeshPieces cut =
-      cutMesh(cube(), {.kerf = 0.25f, .solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}});
+  const Pieces cut =
+      cutIntoMeshes(cube(), {.solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}}, {.kerf = 0.25f});
   ASSERT_EQ(cut.pieces.size(), 2u);
   EXPECT_NEAR(cut.pieces[0].mass.volume, 8 - 1.25 * 1.25 * 1.25, 1e-13);
   EXPECT_NEAR(cut.pieces[1].mass.volume, 0.75 * 0.75 * 0.75, 1e-13);
   // Of a ball: faces move by half the kerf, so that its radius does.
-  const MeshPieces round = cutMesh(cube(), {.kerf = 0.1f, .solids = {icosphere(0.8, 4)}});
+  const Pieces round = cutIntoMeshes(cube(), {.solids = {icosphere(0.8, 4)}}, {.kerf = 0.1f});
   ASSERT_EQ(round.pieces.size(), 2u);
   const double shell = 4 * M_PI / 3 * (std::pow(0.85, 3) - std::pow(0.75, 3));
   EXPECT_NEAR(8 - volumeSum(round), shell, 0.01 * shell);
@@ -282,46 +283,43 @@ TEST(MeshKnives, AKerfTakesItsWidthTimesTheAreaOfTheBlade) {
   const Mesh mesh = torusMesh(1, 0.4, 60, 30);
   const float kerf = 0.02f;
   const BladePlane plane{{0.1f, 0.05f, 0.02f}, {1, 0.3f, 0.2f}};
-  const std::array<MeshCutOptions, 3> cuts{MeshCutOptions{.planes = {plane}},
-                                           MeshCutOptions{.cells = {{-1, 0.1f, 0}, {0.9f, 0, 0.2f}}},
-                                           MeshCutOptions{.rough = {rough(plane, 0.06f, 2)}}};
+  const std::array<Knives, 3> cuts{Knives{.planes = {plane}},
+                                   Knives{.cells = {{-1, 0.1f, 0}, {0.9f, 0, 0.2f}}},
+                                   Knives{.rough = {rough(plane, 0.06f, 2)}}};
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     SCOPED_TRACE(i);
     double area = 0;
-    for (const MeshPiece& piece : cutMesh(mesh, cuts[i]).pieces) area += insideArea(piece.mesh) / 2;
-    MeshCutOptions wide = cuts[i];
-    wide.kerf = kerf;
-    const MeshPieces cut = cutMesh(mesh, wide);
-    for (const MeshPiece& piece : cut.pieces) EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
+    for (const Piece& piece : cutIntoMeshes(mesh, cuts[i]).pieces) area += insideArea(piece.mesh) / 2;
+    const Pieces cut = cutIntoMeshes(mesh, cuts[i], {.kerf = kerf});
+    for (const Piece& piece : cut.pieces) EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
     const double gone = signedVolume(mesh) - volumeSum(cut);
     EXPECT_NEAR(gone / (double(kerf) * area), 1, 0.01);
     if (i == 2) {
-      EXPECT_GT(area, 1.05 * insideArea(cutMesh(mesh, cuts[0]).pieces[0].mesh));
+      EXPECT_GT(area, 1.05 * insideArea(cutIntoMeshes(mesh, cuts[0]).pieces[0].mesh));
     }
   }
 }
 
 TEST(MeshKnives, AKerfWiderThanEverythingLeavesNothing) {
-  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 1, 0}}}, .kerf = 10});
+  const Pieces cut = cutIntoMeshes(cube(), {.planes = {{{0, 0, 0}, {0, 1, 0}}}}, {.kerf = 10});
   EXPECT_TRUE(cut.pieces.empty());
   EXPECT_EQ(cut.slivers, 0u);
-  EXPECT_TRUE(cutMesh(cube(), {.cells = {{-0.5f, 0, 0}, {0.5f, 0, 0}}, .kerf = 10}).pieces.empty());
-  EXPECT_TRUE(cutMesh(cube(), {.kerf = 10, .rough = {rough({{0, 0, 0}, {0, 1, 0}})}}).pieces.empty());
+  EXPECT_TRUE(cutIntoMeshes(cube(), {.cells = {{-0.5f, 0, 0}, {0.5f, 0, 0}}}, {.kerf = 10}).pieces.empty());
+  EXPECT_TRUE(cutIntoMeshes(cube(), {.rough = {rough({{0, 0, 0}, {0, 1, 0}})}}, {.kerf = 10}).pieces.empty());
 }
 
 TEST(MeshKnives, AllKindsCutTogether) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   const Box box = boundingBox(mesh);
-  MeshCutOptions options{
-      .planes = randomBlades({.count = 2, .box = box, .seed = 5}),
-      .cells = scatteredPoints(ScalarField(1), box, 6, 4),
-      .rough = roughBlades(mesh, 2),
-      .solids = {icosphere(0.5, 3, {1, 0.1, 0}), boxMesh({-2, -0.3, -0.2}, {0, 0.5, 0.1})}};
-  const MeshPieces cut = cutMesh(mesh, options);
+  const Knives knives{.planes = randomBlades({.count = 2, .box = box, .seed = 5}),
+                      .cells = scatteredPoints(ScalarField(1), box, 6, 4),
+                      .rough = roughBlades(mesh, 2),
+                      .solids = {icosphere(0.5, 3, {1, 0.1, 0}), boxMesh({-2, -0.3, -0.2}, {0, 0.5, 0.1})}};
+  const Pieces cut = cutIntoMeshes(mesh, knives);
   expectSound(mesh, cut);
   EXPECT_GT(cut.pieces.size(), 40u);
   for (std::size_t i = 0; i + 1 < cut.pieces.size(); ++i) {
-    const MeshPiece &a = cut.pieces[i], &b = cut.pieces[i + 1];
+    const Piece &a = cut.pieces[i], &b = cut.pieces[i + 1];
     ASSERT_EQ(a.code.sides.size(), 6u);
     EXPECT_LE(*a.cell, *b.cell);
     if (a.cell == b.cell) {
@@ -329,30 +327,29 @@ TEST(MeshKnives, AllKindsCutTogether) {
     }
   }
   // Sides are what they say.
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     const Vec3d& p = piece.mesh.positions[0];
     if (length(p - Vec3d{1, 0.1, 0}) < 0.49) {
       EXPECT_TRUE(piece.code.sides[4]);
     }
-    const double height = dot(p - Vec3d(options.planes[0].point), Vec3d(options.planes[0].normal));
+    const double height = dot(p - Vec3d(knives.planes[0].point), Vec3d(knives.planes[0].normal));
     if (std::abs(height) > 1e-6) {
       EXPECT_EQ(piece.code.sides[0], height > 0);
     }
   }
-  options.kerf = 0.01f;
-  const MeshPieces wide = cutMesh(mesh, options);
-  for (const MeshPiece& piece : wide.pieces) EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
+  const Pieces wide = cutIntoMeshes(mesh, knives, {.kerf = 0.01f});
+  for (const Piece& piece : wide.pieces) EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold());
   EXPECT_LT(volumeSum(wide), volumeSum(cut));
 }
 
 TEST(MeshKnives, ThePiecesAreTheSameInAnyOrder) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   std::vector<RoughBlade> blades = roughBlades(mesh, 4);
-  const MeshPieces cut = cutMesh(mesh, {.rough = blades});
+  const Pieces cut = cutIntoMeshes(mesh, {.rough = blades});
   std::reverse(blades.begin(), blades.end());
-  const MeshPieces other = cutMesh(mesh, {.rough = blades});
+  const Pieces other = cutIntoMeshes(mesh, {.rough = blades});
   ASSERT_EQ(cut.pieces.size(), other.pieces.size());
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     const std::vector<bool> sides(piece.code.sides.rbegin(), piece.code.sides.rend());
     EXPECT_NEAR(volumeOn(other, sides), volumeOn(cut, piece.code.sides), 1e-13);
   }
@@ -360,12 +357,12 @@ TEST(MeshKnives, ThePiecesAreTheSameInAnyOrder) {
 
 TEST(MeshKnives, DoNotDependOnTheNumberOfThreads) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
-  const MeshCutOptions options{.cells = scatteredPoints(ScalarField(1), boundingBox(mesh), 4, 4),
-                               .rough = roughBlades(mesh, 3),
-                               .solids = {icosphere(0.5, 3, {1, 0.1, 0})}};
-  const MeshPieces cut = cutMesh(mesh, options);
+  const Knives knives{.cells = scatteredPoints(ScalarField(1), boundingBox(mesh), 4, 4),
+                      .rough = roughBlades(mesh, 3),
+                      .solids = {icosphere(0.5, 3, {1, 0.1, 0})}};
+  const Pieces cut = cutIntoMeshes(mesh, knives);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const MeshPieces again = cutMesh(mesh, options);
+  const Pieces again = cutIntoMeshes(mesh, knives);
   ASSERT_EQ(cut.pieces.size(), again.pieces.size());
   for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
     EXPECT_EQ(cut.pieces[i].mesh.positions, again.pieces[i].mesh.positions);
@@ -380,11 +377,12 @@ TEST(MeshKnives, KnownMeshesSumToThemselves) {
     SCOPED_TRACE(name);
     const Mesh mesh = readMesh(path);
     const Box box = boundingBox(mesh);
-    const MeshPieces cut = cutMesh(mesh, {.rough = roughBlades(mesh, 3)});
+    const Pieces cut = cutIntoMeshes(mesh, {.rough = roughBlades(mesh, 3)});
     expectSound(mesh, cut);
     EXPECT_GE(cut.pieces.size(), 5u);
     const Mesh ball = icosphere(0.25 * double(length(box.size())), 4, Vec3d(box.center()));
-    expectSound(mesh, cutMesh(mesh, {.planes = randomBlades({.count = 2, .box = box}), .solids = {ball}}));
+    expectSound(mesh,
+                cutIntoMeshes(mesh, {.planes = randomBlades({.count = 2, .box = box}), .solids = {ball}}));
   }
 }
 
@@ -392,7 +390,7 @@ TEST(MeshKnives, OuterFacesKeepTheirTextureCoordinates) {
   const std::string path = sharedData("meshes/spot_uv.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const Mesh spot = triangulated(readMesh(path));
-  const MeshPieces cut = cutMesh(
+  const Pieces cut = cutIntoMeshes(
       spot, {.planes = randomBlades({.count = 1, .box = boundingBox(spot)}), .rough = roughBlades(spot, 2)});
   std::size_t checked = 0;
   EXPECT_LT(worstTexture(spot, cut, 5, checked), 1e-5);
@@ -406,10 +404,10 @@ TEST(MeshKnives, GroupsAndVertexColoursContinue) {
   for (const Vec3d& p : mesh.positions)
     for (const int k : {0, 1, 2}) colour.values.push_back(float(p[k]));
   mesh.attributes.push_back(colour);
-  const MeshPieces cut = cutMesh(
+  const Pieces cut = cutIntoMeshes(
       mesh, {.planes = {{{0.5f, 0, 0}, {1, 0.5f, 0.25f}}}, .rough = {rough({{0, 0, 0}, {0.2f, 1, 0.1f}})}});
   ASSERT_EQ(cut.pieces.size(), 4u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     ASSERT_GE(piece.mesh.groups.size(), 2u);
     EXPECT_EQ(piece.mesh.groups.back().name, "inside");
     std::vector<bool> isOuter(piece.mesh.positions.size());
@@ -435,10 +433,10 @@ TEST(MeshKnives, RefuseWhatCannotCut) {
     std::swap(turned.corners[c], turned.corners[c + 1]);
   expectError(cube(), {.solids = {turned}}, "solid 0 must enclose a volume");
   expectError(cube(), {.solids = {Mesh{}}}, "solid 0 has no faces");
-  expectError(cube(), {.kerf = -0.1f}, "kerf must be finite and >= 0, got -0.1");
-  expectError(cube(), {.kerf = std::numeric_limits<float>::quiet_NaN()}, "kerf");
-  expectError(cube(), {.kerf = 1.5f, .solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}},
-              "a kerf of 1.5 is too wide for solid 0");
+  expectError(cube(), {}, "kerf must be finite and >= 0, got -0.1", {.kerf = -0.1f});
+  expectError(cube(), {}, "kerf", {.kerf = std::numeric_limits<float>::quiet_NaN()});
+  expectError(cube(), {.solids = {boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})}},
+              "a kerf of 1.5 is too wide for solid 0", {.kerf = 1.5f});
   expectError(cube(), {.rough = {rough({{0, 0, 0}, {0, 0, 0}})}}, "rough blade 0");
   expectError(cube(), {.rough = {rough({{0, 0, 0}, {0, 1, 0}}, -1)}}, "amplitude must be >= 0, got -1");
   RoughBlade fine = rough({{0, 0, 0}, {0, 1, 0}});
@@ -457,8 +455,8 @@ TEST(MeshKnives, SayWhatCrossesItselfWhereAnotherPasses) {
   // Where nothing else passes, what crosses itself is taken as it is.
   const Mesh bars =
       joined(boxMesh({-3, -0.2, -0.2}, {0.1, 0.2, 0.2}), boxMesh({-0.1, -0.1, -0.1}, {3, 0.3, 0.3}));
-  EXPECT_NEAR(volumeSum(cutMesh(cube(), {.solids = {bars}})), 8, 1e-13);
-  const MeshPieces cut = cutMesh(crossed, {.solids = {away}});
+  EXPECT_NEAR(volumeSum(cutIntoMeshes(cube(), {.solids = {bars}})), 8, 1e-13);
+  const Pieces cut = cutIntoMeshes(crossed, {.solids = {away}});
   EXPECT_NEAR(volumeSum(cut), signedVolume(crossed), 1e-13);
   // A knife that crosses itself in the surface of the mesh.
   const Mesh knife =

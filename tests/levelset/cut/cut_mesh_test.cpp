@@ -73,11 +73,11 @@ TEST(MassProperties, OfACornerTetrahedronHaveItsProductsOfInertia) {
 }
 
 TEST(MeshPieces, APlaneThroughTheCentreHalvesACube) {
-  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 2, 0}}}});
+  const Pieces cut = cutIntoMeshes(cube(), {.planes = {{{0, 0, 0}, {0, 2, 0}}}});
   expectSound(cube(), cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
   for (const std::size_t k : {0, 1}) {
-    const MeshPiece& piece = cut.pieces[k];
+    const Piece& piece = cut.pieces[k];
     EXPECT_EQ(piece.code.sides, std::vector<bool>{k == 1});
     EXPECT_NEAR(piece.mass.volume, 4, 1e-14);
     EXPECT_NEAR(piece.mass.area, 16, 1e-14);
@@ -94,7 +94,7 @@ TEST(MeshPieces, APlaneThroughTheCentreHalvesACube) {
 TEST(MeshPieces, APlaneInAFaceOfABoxCutsNothing) {
   for (const float y : {-1.0f, 1.0f})
     for (const float up : {-1.0f, 1.0f}) {
-      const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, y, 0}, {0, up, 0}}}});
+      const Pieces cut = cutIntoMeshes(cube(), {.planes = {{{0, y, 0}, {0, up, 0}}}});
       ASSERT_EQ(cut.pieces.size(), 1u);
       EXPECT_EQ(cut.slivers, 0u);
       EXPECT_EQ(cut.pieces[0].mesh.faceCount(), 12u);
@@ -105,12 +105,12 @@ TEST(MeshPieces, APlaneInAFaceOfABoxCutsNothing) {
 
 TEST(MeshPieces, APlaneInTheFaceOfAStepLeavesThatFaceOutside) {
   for (const float up : {-1.0f, 1.0f}) {
-    const MeshPieces cut = cutMesh(step(), {.planes = {{{0, 1, 0}, {0, up, 0}}}});
+    const Pieces cut = cutIntoMeshes(step(), {.planes = {{{0, 1, 0}, {0, up, 0}}}});
     expectSound(step(), cut);
     ASSERT_EQ(cut.pieces.size(), 2u);
     EXPECT_EQ(cut.slivers, 0u);
     std::vector<double> volumes;
-    for (const MeshPiece& piece : cut.pieces) {
+    for (const Piece& piece : cut.pieces) {
       volumes.push_back(piece.mass.volume);
       // Only what was under the tower is new.
       EXPECT_NEAR(insideArea(piece.mesh), 1, 1e-14);
@@ -126,14 +126,14 @@ TEST(MeshPieces, PlanesThatMeetInTheEdgesOfATetrahedronLeaveAnOctahedron) {
   mesh.positions = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   for (const auto& face : {std::array<std::uint32_t, 3>{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}})
     mesh.addFace(face);
-  MeshCutOptions options;
+  Knives knives;
   // Halfway to each corner: all four planes pass through the middles of edges, two by two.
-  for (const Vec3d& corner : mesh.positions) options.planes.push_back({Vec3f(corner / 3.0), Vec3f(corner)});
-  const MeshPieces cut = cutMesh(mesh, options);
+  for (const Vec3d& corner : mesh.positions) knives.planes.push_back({Vec3f(corner / 3.0), Vec3f(corner)});
+  const Pieces cut = cutIntoMeshes(mesh, knives);
   expectSound(mesh, cut);
   ASSERT_EQ(cut.pieces.size(), 5u);
   std::vector<double> volumes;
-  for (const MeshPiece& piece : cut.pieces) volumes.push_back(piece.mass.volume * 3 / 8);
+  for (const Piece& piece : cut.pieces) volumes.push_back(piece.mass.volume * 3 / 8);
   std::sort(volumes.begin(), volumes.end());
   for (const std::size_t k : {0, 1, 2, 3}) EXPECT_NEAR(volumes[k], 1 / 8.0, 1e-7);
   EXPECT_NEAR(volumes[4], 1 / 2.0, 1e-7);
@@ -142,22 +142,22 @@ TEST(MeshPieces, PlanesThatMeetInTheEdgesOfATetrahedronLeaveAnOctahedron) {
 TEST(MeshPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
   const Mesh ball = icosphere(1, 3);
   for (const int n : {1, 3, 5, 8}) {
-    const MeshPieces cut = cutMesh(
+    const Pieces cut = cutIntoMeshes(
         ball, {.planes = randomBlades({.count = n, .box = boundingBox(ball), .throughCentre = true})});
     expectSound(ball, cut);
     EXPECT_EQ(cut.pieces.size(), std::size_t(n * n - n + 2));
-    for (const MeshPiece& piece : cut.pieces) EXPECT_EQ(countSelfIntersections(piece.mesh), 0u);
+    for (const Piece& piece : cut.pieces) EXPECT_EQ(countSelfIntersections(piece.mesh), 0u);
   }
 }
 
 TEST(MeshPieces, VerticesInThePlaneAreNotDoubled) {
   // The icosahedron's edges are halved in the planes of its axes: many vertices lie in them exactly.
   const Mesh ball = icosphere(1, 3);
-  const MeshPieces cut =
-      cutMesh(ball, {.planes = {{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {0, 0, 1}}}});
+  const Pieces cut = cutIntoMeshes(
+      ball, {.planes = {{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {0, 0, 1}}}});
   expectSound(ball, cut);
   ASSERT_EQ(cut.pieces.size(), 8u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     EXPECT_NEAR(piece.mass.volume, signedVolume(ball) / 8, 1e-12);
     for (std::size_t f = 0; f < piece.mesh.faceCount(); ++f) EXPECT_GT(faceArea(piece.mesh, f), 1e-12);
     const auto same = firstEqualPosition(piece.mesh.positions);
@@ -172,12 +172,13 @@ TEST(MeshPieces, CutsOfKnownMeshesSumToThem) {
     SCOPED_TRACE(name);
     const Mesh mesh = readMesh(path);
     for (const int n : {1, 5, 20}) {
-      const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = n, .box = boundingBox(mesh)})});
+      const Pieces cut =
+          cutIntoMeshes(mesh, {.planes = randomBlades({.count = n, .box = boundingBox(mesh)})});
       EXPECT_GT(cut.pieces.size(), std::size_t(n));
       expectSound(mesh, cut);
     }
     const auto points = scatteredPoints(ScalarField(1), boundingBox(mesh), 12, 1);
-    const MeshPieces cut = cutMesh(mesh, {.cells = points});
+    const Pieces cut = cutIntoMeshes(mesh, {.cells = points});
     EXPECT_GE(cut.pieces.size(), 10u);
     expectSound(mesh, cut);
   }
@@ -188,9 +189,9 @@ TEST(MeshPieces, TheBunnyInAHundredCellsIsWhole) {
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const Mesh bunny = readMesh(path);
   const auto points = scatteredPoints(ScalarField(1), boundingBox(bunny), 100, 1);
-  const MeshPieces cut = cutMesh(bunny, {.cells = points});
+  const Pieces cut = cutIntoMeshes(bunny, {.cells = points});
   expectSound(bunny, cut);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     ASSERT_TRUE(piece.cell);
     // Every vertex is as near to its point as to any other.
     const Vec3d centre(points[*piece.cell]);
@@ -204,7 +205,7 @@ TEST(MeshPieces, TheBunnyInAHundredCellsIsWhole) {
 TEST(MeshPieces, RimsAreSharp) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   const auto blades = randomBlades({.count = 4, .box = boundingBox(mesh), .seed = 2});
-  for (const MeshPiece& piece : cutMesh(mesh, {.planes = blades}).pieces)
+  for (const Piece& piece : cutIntoMeshes(mesh, {.planes = blades}).pieces)
     for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f) {
       double nearest = 1;
       for (const BladePlane& blade : blades) {
@@ -221,13 +222,13 @@ TEST(MeshPieces, RimsAreSharp) {
 TEST(MeshPieces, PermutedPlanesMakeTheSamePieces) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   auto blades = randomBlades({.count = 6, .box = boundingBox(mesh), .seed = 3});
-  const MeshPieces cut = cutMesh(mesh, {.planes = blades});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = blades});
   std::reverse(blades.begin(), blades.end());
-  const MeshPieces other = cutMesh(mesh, {.planes = blades});
+  const Pieces other = cutIntoMeshes(mesh, {.planes = blades});
   ASSERT_EQ(cut.pieces.size(), other.pieces.size());
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     std::vector<bool> sides(piece.code.sides.rbegin(), piece.code.sides.rend());
-    const auto same = std::count_if(other.pieces.begin(), other.pieces.end(), [&](const MeshPiece& p) {
+    const auto same = std::count_if(other.pieces.begin(), other.pieces.end(), [&](const Piece& p) {
       return p.code.sides == sides && std::abs(p.mass.volume - piece.mass.volume) < 1e-12 &&
              std::abs(p.mass.area - piece.mass.area) < 1e-10 &&
              length(p.mass.centroid - piece.mass.centroid) < 1e-8;
@@ -240,16 +241,16 @@ TEST(MeshPieces, OuterFacesKeepTheirTextureCoordinates) {
   const std::string path = sharedData("meshes/spot_uv.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const Mesh spot = triangulated(readMesh(path));
-  const MeshPieces cut = cutMesh(spot, {.planes = randomBlades({.count = 5, .box = boundingBox(spot)})});
+  const Pieces cut = cutIntoMeshes(spot, {.planes = randomBlades({.count = 5, .box = boundingBox(spot)})});
   std::size_t checked = 0;
   EXPECT_LT(worstTexture(spot, cut, 4, checked), 1e-5);
   EXPECT_GT(checked, 1000u);
 }
 
 TEST(MeshPieces, InnerFacesMeasureTheKnifeInWorldUnits) {
-  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0.25f, 0}, {1, 2, 3}}}});
+  const Pieces cut = cutIntoMeshes(cube(), {.planes = {{{0, 0.25f, 0}, {1, 2, 3}}}});
   ASSERT_EQ(cut.pieces.size(), 2u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     const MeshAttribute& uv = attributeOf(piece.mesh, "uv");
     for (std::size_t f = firstInside(piece.mesh); f < piece.mesh.faceCount(); ++f)
       for (std::size_t k = 0; k < 3; ++k) {
@@ -271,9 +272,9 @@ TEST(MeshPieces, GroupsAndVertexColoursContinue) {
   for (const Vec3d& p : mesh.positions)
     for (const int k : {0, 1, 2}) colour.values.push_back(float(p[k]));
   mesh.attributes.push_back(colour);
-  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0.25f, 0, 0}, {1, 0.5f, 0.25f}}}});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = {{{0.25f, 0, 0}, {1, 0.5f, 0.25f}}}});
   ASSERT_EQ(cut.pieces.size(), 2u);
-  for (const MeshPiece& piece : cut.pieces) {
+  for (const Piece& piece : cut.pieces) {
     ASSERT_EQ(piece.mesh.groups.size(), 3u);
     EXPECT_EQ(piece.mesh.groups[0].name, "bottom and top");
     EXPECT_EQ(piece.mesh.groups[1].name, "rest");
@@ -292,7 +293,7 @@ TEST(MeshPieces, CellsOfALatticeAreItsBoxes) {
   std::vector<Vec3f> points;
   for (int i = 0; i < 8; ++i)
     points.push_back({i & 1 ? 0.5f : -0.5f, i & 2 ? 0.5f : -0.5f, i & 4 ? 0.5f : -0.5f});
-  const MeshPieces cut = cutMesh(cube(), {.cells = points});
+  const Pieces cut = cutIntoMeshes(cube(), {.cells = points});
   ASSERT_EQ(cut.pieces.size(), 8u);
   expectSound(cube(), cut);
   for (std::uint32_t k = 0; k < 8; ++k) {
@@ -305,15 +306,15 @@ TEST(MeshPieces, CellsOfALatticeAreItsBoxes) {
 TEST(MeshPieces, CellsAndPlanesCutTogether) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   const auto points = scatteredPoints(ScalarField(1), boundingBox(mesh), 10, 4);
-  const MeshPieces cut =
-      cutMesh(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)}), .cells = points});
+  const Pieces cut =
+      cutIntoMeshes(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)}), .cells = points});
   EXPECT_GT(cut.pieces.size(), 20u);
   expectSound(mesh, cut);
 }
 
 TEST(MeshPieces, APlaneThatMissesLeavesTheMeshAsItIs) {
   const Mesh mesh = icosphere(1, 2);
-  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0, 2, 0}, {0, 1, 0}}}});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = {{{0, 2, 0}, {0, 1, 0}}}});
   ASSERT_EQ(cut.pieces.size(), 1u);
   EXPECT_EQ(cut.pieces[0].code.sides, std::vector<bool>{false});
   EXPECT_EQ(cut.pieces[0].mesh.faceCount(), mesh.faceCount());
@@ -324,7 +325,7 @@ TEST(MeshPieces, CoincidentPlanesCutOnce) {
   const Mesh mesh = icosphere(1, 3);
   const Vec3f n{1, 2, 3};
   // The third is the first, turned over and moved in itself; the fourth is off by less than rounding.
-  const MeshPieces cut = cutMesh(
+  const Pieces cut = cutIntoMeshes(
       mesh, {.planes = {{{0, 0, 0}, n}, {{0, 0, 0}, n}, {{2, -1, 0}, -n}, {{0, 0, 1e-13f}, n * 2.0f}}});
   expectSound(mesh, cut);
   ASSERT_EQ(cut.pieces.size(), 2u);
@@ -336,23 +337,23 @@ TEST(MeshPieces, CoincidentPlanesCutOnce) {
 TEST(MeshPieces, NearlyCoincidentPlanesStayClosed) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
   for (const float angle : {1e-4f, 1e-6f, 1e-8f}) {
-    MeshCutOptions options;
+    Knives knives;
     for (int k = 0; k < 6; ++k)
-      options.planes.push_back({{0.1f, 0, 0}, {1, angle * float(k), angle * float(k * k % 5)}});
-    expectSound(mesh, cutMesh(mesh, options));
+      knives.planes.push_back({{0.1f, 0, 0}, {1, angle * float(k), angle * float(k * k % 5)}});
+    expectSound(mesh, cutIntoMeshes(mesh, knives));
   }
 }
 
 TEST(MeshPieces, CavitiesStayWithTheSolidAroundThem) {
   const Mesh mesh = joined(cube(), insideOut(boxMesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5})));
-  const MeshPieces beside = cutMesh(mesh, {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}});
+  const Pieces beside = cutIntoMeshes(mesh, {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}});
   ASSERT_EQ(beside.pieces.size(), 2u);
   EXPECT_NEAR(beside.pieces[0].mass.volume, 4 * 1.75 - 1, 1e-12);
   EXPECT_NEAR(beside.pieces[1].mass.volume, 4 * 0.25, 1e-12);
-  const MeshPieces through = cutMesh(mesh, {.planes = {{{0, 0, 0}, {0, 1, 0}}}});
+  const Pieces through = cutIntoMeshes(mesh, {.planes = {{{0, 0, 0}, {0, 1, 0}}}});
   expectSound(mesh, through);
   ASSERT_EQ(through.pieces.size(), 2u);
-  for (const MeshPiece& piece : through.pieces) {
+  for (const Piece& piece : through.pieces) {
     EXPECT_NEAR(piece.mass.volume, 3.5, 1e-12);
     EXPECT_NEAR(insideArea(piece.mesh), 3, 1e-12);
     EXPECT_EQ(topologyOf(piece.mesh).eulerCharacteristic, 2);
@@ -361,16 +362,17 @@ TEST(MeshPieces, CavitiesStayWithTheSolidAroundThem) {
 
 TEST(MeshPieces, PartsOfOneSideThatDoNotHangTogetherAreSeveralPieces) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
-  const MeshPieces cut = cutMesh(mesh, {.planes = {{{0.2f, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {1, 0, 0}}}});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = {{{0.2f, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {1, 0, 0}}}});
   EXPECT_EQ(cut.pieces.size(), 4u);
-  const MeshPieces slab = cutMesh(mesh, {.planes = {{{0, 0.1f, 0}, {0, 1, 0}}, {{0, -0.1f, 0}, {0, 1, 0}}}});
+  const Pieces slab =
+      cutIntoMeshes(mesh, {.planes = {{{0, 0.1f, 0}, {0, 1, 0}}, {{0, -0.1f, 0}, {0, 1, 0}}}});
   // Above, below, and the two ends of the slab between, left and right of the hole.
   EXPECT_EQ(slab.pieces.size(), 4u);
   expectSound(mesh, slab);
 }
 
 TEST(MeshPieces, SliversAreLeftOutAndCounted) {
-  const MeshPieces cut = cutMesh(cube(), {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}, .minVolume = 1.5});
+  const Pieces cut = cutIntoMeshes(cube(), {.planes = {{{0, 0.75f, 0}, {0, 1, 0}}}}, {.minVolume = 1.5});
   ASSERT_EQ(cut.pieces.size(), 1u);
   EXPECT_EQ(cut.slivers, 1u);
   EXPECT_NEAR(cut.sliverVolume, 1, 1e-14);
@@ -380,33 +382,33 @@ TEST(MeshPieces, SliversAreLeftOutAndCounted) {
 
 TEST(MeshPieces, VerticesThatOnlyCoincideAreJoined) {
   const Mesh mesh = unshared(torusMesh(1, 0.4, 20, 10));
-  const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)})});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = randomBlades({.count = 3, .box = boundingBox(mesh)})});
   expectSound(mesh, cut);
 }
 
 TEST(MeshPieces, OfOverlappingSolidsHaveNoOpenEdgeAndTheSignedVolume) {
   const Mesh mesh = joined(icosphere(1, 2), icosphere(1, 2, {0.7, 0.1, 0}));
-  const MeshPieces cut = cutMesh(mesh, {.planes = randomBlades({.count = 5, .box = boundingBox(mesh)})});
+  const Pieces cut = cutIntoMeshes(mesh, {.planes = randomBlades({.count = 5, .box = boundingBox(mesh)})});
   EXPECT_NEAR(volumeSum(cut), signedVolume(mesh), 1e-12);
-  for (const MeshPiece& piece : cut.pieces)
+  for (const Piece& piece : cut.pieces)
     EXPECT_TRUE(topologyOf(piece.mesh).isClosedManifold()) << topologyOf(piece.mesh);
 }
 
 TEST(MeshPieces, OfManyPlanesAreAllThere) {
   const Mesh ball = icosphere(1, 3);
-  const MeshPieces cut =
-      cutMesh(ball, {.planes = randomBlades({.count = 70, .box = boundingBox(ball), .throughCentre = true})});
+  const Pieces cut = cutIntoMeshes(
+      ball, {.planes = randomBlades({.count = 70, .box = boundingBox(ball), .throughCentre = true})});
   EXPECT_EQ(cut.pieces.size() + cut.slivers, 70u * 70u - 70u + 2u);
   EXPECT_NEAR(volumeSum(cut), signedVolume(ball), 1e-12);
 }
 
 TEST(MeshPieces, DoNotDependOnTheNumberOfThreads) {
   const Mesh mesh = torusMesh(1, 0.4, 40, 20);
-  const MeshCutOptions options{.planes = randomBlades({.count = 2, .box = boundingBox(mesh)}),
-                               .cells = scatteredPoints(ScalarField(1), boundingBox(mesh), 20, 4)};
-  const MeshPieces cut = cutMesh(mesh, options);
+  const Knives knives{.planes = randomBlades({.count = 2, .box = boundingBox(mesh)}),
+                      .cells = scatteredPoints(ScalarField(1), boundingBox(mesh), 20, 4)};
+  const Pieces cut = cutIntoMeshes(mesh, knives);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const MeshPieces again = cutMesh(mesh, options);
+  const Pieces again = cutIntoMeshes(mesh, knives);
   ASSERT_EQ(cut.pieces.size(), again.pieces.size());
   for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
     EXPECT_EQ(cut.pieces[i].mesh.positions, again.pieces[i].mesh.positions);
@@ -420,21 +422,22 @@ TEST(MeshPieces, RefuseWhatCannotBeCut) {
   open.corners.resize(33);
   open.faceStart.pop_back();
   try {
-    cutMesh(open, {});
+    cutIntoMeshes(open, {});
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("open: 3 edges"), std::string::npos) << error.what();
   }
-  EXPECT_THROW(cutMesh({}, {}), Error);
-  EXPECT_THROW(cutMesh(insideOut(cube()), {}), Error);
+  EXPECT_THROW(cutIntoMeshes(Mesh{}, {}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {.fields = {Knife(ScalarField(1))}}), Error);
+  EXPECT_THROW(cutIntoMeshes(insideOut(cube()), {}), Error);
   Mesh notFinite = cube();
   notFinite.positions[3].x = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(cutMesh(notFinite, {}), Error);
-  EXPECT_THROW(cutMesh(cube(), {.planes = {{{0, 0, 0}, {0, 0, 0}}}}), Error);
-  EXPECT_THROW(cutMesh(cube(), {.planes = {{{0, NAN, 0}, {0, 1, 0}}}}), Error);
-  EXPECT_THROW(cutMesh(cube(), {.cells = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}}), Error);
-  EXPECT_THROW(cutMesh(cube(), {.cells = {{0, 0, INFINITY}}}), Error);
-  EXPECT_THROW(cutMesh(cube(), {.minVolume = -1}), Error);
+  EXPECT_THROW(cutIntoMeshes(notFinite, {}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {.planes = {{{0, 0, 0}, {0, 0, 0}}}}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {.planes = {{{0, NAN, 0}, {0, 1, 0}}}}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {.cells = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}}}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {.cells = {{0, 0, INFINITY}}}), Error);
+  EXPECT_THROW(cutIntoMeshes(cube(), {}, {.minVolume = -1}), Error);
 }
 
 }  // namespace

@@ -30,22 +30,22 @@ double innerArea(const Mesh& mesh) {
   return area;
 }
 
-std::vector<CutPart> partsOf(const PieceSet& set) {
+std::vector<CutPart> partsOf(const Pieces& set) {
   std::vector<CutPart> parts;
-  for (const NamedPiece& piece : set.pieces)
+  for (const Piece& piece : set.pieces)
     parts.push_back({.name = piece.name, .parent = piece.parent, .mesh = piece.mesh});
   return parts;
 }
 
 TEST(PieceSet, ContactsAreFoundAcrossAnEarlierCut) {
   const std::vector<CutPart> model{{.mesh = icosphere(1, 3)}};
-  const PieceSet first = cutParts(model, {.planes = {kAcrossX}});
+  const Pieces first = cutIntoMeshes(model, {.planes = {kAcrossX}});
   ASSERT_EQ(first.pieces.size(), 2u);
-  const PieceSet again = cutParts(partsOf(first), {.planes = {kAcrossY}});
-  const PieceSet atOnce = cutParts(model, {.planes = {kAcrossX, kAcrossY}});
+  const Pieces again = cutIntoMeshes(partsOf(first), {.planes = {kAcrossY}});
+  const Pieces atOnce = cutIntoMeshes(model, {.planes = {kAcrossX, kAcrossY}});
   ASSERT_EQ(again.pieces.size(), 4u);
   EXPECT_NEAR(again.volumeSum, atOnce.volumeSum, 1e-12);
-  for (const NamedPiece& piece : again.pieces) {
+  for (const Piece& piece : again.pieces) {
     EXPECT_TRUE(piece.closed);
     // Every inner face touches another piece: two neighbours, one across either plane.
     ASSERT_EQ(piece.neighbours.size(), 2u);
@@ -58,15 +58,15 @@ TEST(PieceSet, ContactsAreFoundAcrossAnEarlierCut) {
 
 TEST(PieceSet, PartsThatNoKnifeTouchesStayAsTheyAre) {
   const std::vector<CutPart> model{{.mesh = boxMesh({-1, -1, -1}, {1, 1, 1})}};
-  const PieceSet first = cutParts(model, {.planes = {kAcrossX}});
-  const PieceSet again = cutParts(partsOf(first), {.planes = {{{0.5f, 0, 0}, {1, 0, 0}}}});
+  const Pieces first = cutIntoMeshes(model, {.planes = {kAcrossX}});
+  const Pieces again = cutIntoMeshes(partsOf(first), {.planes = {{{0.5f, 0, 0}, {1, 0, 0}}}});
   ASSERT_EQ(again.pieces.size(), 3u);
   EXPECT_EQ(again.pieces[0].name, "piece_0001");
   EXPECT_EQ(again.pieces[0].parent, "");
   EXPECT_EQ(again.pieces[0].mesh.positions, first.pieces[0].mesh.positions);
   EXPECT_EQ(again.pieces[0].mesh.corners, first.pieces[0].mesh.corners);
   // The model itself becomes a piece even where nothing cuts it.
-  const PieceSet missed = cutParts(model, {.planes = {{{5, 0, 0}, {1, 0, 0}}}});
+  const Pieces missed = cutIntoMeshes(model, {.planes = {{{5, 0, 0}, {1, 0, 0}}}});
   ASSERT_EQ(missed.pieces.size(), 1u);
   EXPECT_EQ(missed.pieces[0].name, "piece_0001");
 }
@@ -74,15 +74,15 @@ TEST(PieceSet, PartsThatNoKnifeTouchesStayAsTheyAre) {
 TEST(PieceSet, RefusesNamesThatWouldBeGivenTwice) {
   std::vector<CutPart> parts{{.name = "a", .parent = "", .mesh = boxMesh({-1, -1, -1}, {1, 1, 1})},
                              {.name = "a_0001", .parent = "", .mesh = boxMesh({5, -1, -1}, {7, 1, 1})}};
-  EXPECT_THROW(cutParts(parts, {.planes = {kAcrossX}}), Error);
+  EXPECT_THROW(cutIntoMeshes(parts, {.planes = {kAcrossX}}), Error);
   parts[1].name = "a";
-  EXPECT_THROW(cutParts(parts, {.planes = {kAcrossX}}), Error);
-  EXPECT_THROW(cutParts({}, {}), Error);
+  EXPECT_THROW(cutIntoMeshes(parts, {.planes = {kAcrossX}}), Error);
+  EXPECT_THROW(cutIntoMeshes(std::vector<CutPart>{}, {}), Error);
 }
 
 TEST(PieceSet, MovesPiecesApartFromTheMiddleOfAll) {
   const std::vector<CutPart> model{{.mesh = boxMesh({-1, 0, 0}, {3, 1, 1})}};
-  const PieceSet set = cutParts(model, {.planes = {kAcrossX}});
+  const Pieces set = cutIntoMeshes(model, {.planes = {kAcrossX}});
   // Centroids at x = -0.5 and 1.5, of all at 1.
   const std::vector<Vec3d> offsets = explodedOffsets(set, 0.5);
   EXPECT_NEAR(length(offsets[0] - Vec3d{-0.75, 0, 0}), 0, 1e-12);

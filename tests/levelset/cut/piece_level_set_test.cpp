@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "nephele/levelset/cut/cut_into_level_sets.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/cut/detail/cut_kernels.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/grid_field.h"
@@ -25,10 +25,8 @@ namespace {
 constexpr Box kBall{{-1, -1, -1}, {1, 1, 1}};
 
 Pieces ballInPieces(int blades, float voxelSize) {
-  CutOptions options{.voxelSize = voxelSize, .box = kBall};
-  for (const BladePlane& blade : randomBlades({.count = blades, .box = kBall, .seed = 7}))
-    options.knives.push_back(flatKnife(blade));
-  return cutIntoPieces(sphere({0, 0, 0}, 1), options);
+  return cutIntoLevelSets(sphere({0, 0, 0}, 1), {.voxelSize = voxelSize, .box = kBall},
+                          {.planes = randomBlades({.count = blades, .box = kBall, .seed = 7})});
 }
 
 bool sameBits(float a, float b) {
@@ -39,11 +37,12 @@ TEST(PieceLevelSet, HasTheSamplesOfItsCopy) {
   const Pieces cut = ballInPieces(3, 0.05f);
   ASSERT_GT(cut.pieces.size(), 3u);
   for (const Piece& piece : cut.pieces) {
-    const auto copy = piece.level.toBricks();
-    EXPECT_EQ(copy->poolSize(), piece.level.storedBricks() + 2);
+    const auto copy = piece.level->toBricks();
+    EXPECT_EQ(copy->poolSize(), piece.level->storedBricks() + 2);
     for (int k = -26; k <= 26; k += 2)
       for (int j = -26; j <= 26; j += 3)
-        for (int i = -26; i <= 26; ++i) ASSERT_TRUE(sameBits(piece.level.at({i, j, k}), copy->at({i, j, k})));
+        for (int i = -26; i <= 26; ++i)
+          ASSERT_TRUE(sameBits(piece.level->at({i, j, k}), copy->at({i, j, k})));
   }
 }
 
@@ -58,15 +57,15 @@ TEST(PieceLevelSet, IsAsAFieldWhatItsCopyIs) {
   const PointSpans spans{points[0], points[1], points[2]};
   std::vector<float> direct(spans.size()), copied(spans.size());
   for (const Piece& piece : cut.pieces) {
-    piece.level.field().eval(spans, direct);
-    gridField(piece.level.toBricks()).eval(spans, copied);
+    piece.level->field().eval(spans, direct);
+    gridField(piece.level->toBricks()).eval(spans, copied);
     for (std::size_t i = 0; i < direct.size(); ++i) ASSERT_TRUE(sameBits(direct[i], copied[i])) << i;
   }
 }
 
 TEST(PieceLevelSet, OutlivesItsCut) {
   Pieces cut = ballInPieces(2, 0.05f);
-  const PieceLevelSet kept = cut.pieces[0].level;
+  const PieceLevelSet kept = *cut.pieces[0].level;
   const auto before = kept.toBricks();
   cut = {};
   const auto after = kept.toBricks();
@@ -76,12 +75,43 @@ TEST(PieceLevelSet, OutlivesItsCut) {
 
 TEST(PieceLevelSet, TakesLessThanHalfOfACopyWithBorders) {
   for (const Piece& piece : ballInPieces(5, 0.03f).pieces)
-    EXPECT_LT(2 * piece.level.memoryBytes(), piece.level.toBricks()->memoryBytes());
+    EXPECT_LT(2 * piece.level->memoryBytes(), piece.level->toBricks()->memoryBytes());
 }
 
-TEST(PieceLevelSet, RefusesToBeAFieldOfNothing) {
-  EXPECT_THROW(PieceLevelSet().field(), Error);
-  EXPECT_THROW(PieceLevelSet().toBricks(), Error);
+TEST(PieceLevelSet, RangesNarrowWithTheirBoxes) {
+  // A ball of radius 1 with a band of 0.15: nothing of the surface is near the middle, beside the ball or
+  // beyond the table, and a box of one voxel holds values no farther apart than its diagonal.
+  const ScalarField ball = ballInPieces(0, 0.05f).pieces.at(0).level->field();
+  const Interval all = ball.range({{-2, -2, -2}, {2, 2, 2}});
+  EXPECT_LE(all.min, -0.15f);
+  EXPECT_GE(all.max, 0.15f);
+  const Interval middle = ball.range({{-0.2f, -0.2f, -0.2f}, {0.2f, 0.2f, 0.2f}});
+  EXPECT_EQ(middle.min, 0.15f);
+  EXPECT_EQ(middle.max, 0.15f);
+  for (const float x : {1.5f, 100.0f, 1e12f})
+    EXPECT_EQ(ball.range({{x, 0, 0}, {x * 1.1f, 1, 1}}).max, -0.15f);
+  const Interval atSurface = ball.range({{0.98f, 0, 0}, {1.02f, 0.05f, 0.05f}});
+  EXPECT_LT(atSurface.min, 0);
+  EXPECT_GT(atSurface.max, 0);
+  EXPECT_LT(atSurface.max - atSurface.min, 0.15f);
+}
+
+TEST(PieceLevelSet, RangesContainAllValues) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> place(-1.3f, 1.3f), size(0, 0.5f), share(0, 1);
+  for (const Piece& piece : ballInPieces(4, 0.05f).pieces) {
+    const ScalarField field = piece.level->field();
+    for (int round = 0; round < 200; ++round) {
+      const Vec3f low{place(random), place(random), place(random)};
+      const float edge = size(random);
+      const Interval range = field.range({low, low + Vec3f{edge, edge, edge}});
+      for (int i = 0; i < 20; ++i) {
+        const float v = field(low + Vec3f{share(random), share(random), share(random)} * edge);
+        ASSERT_LE(range.min, v);
+        ASSERT_GE(range.max, v);
+      }
+    }
+  }
 }
 
 TEST(PieceVolumes, AreThoseOfTheMarchingCubesMeshes) {
@@ -89,25 +119,25 @@ TEST(PieceVolumes, AreThoseOfTheMarchingCubesMeshes) {
   const auto check = [](const Pieces& cut) {
     ASSERT_FALSE(cut.pieces.empty());
     for (const Piece& piece : cut.pieces) {
-      const double volume = signedVolume(marchingCubes(*piece.level.toBricks()));
-      EXPECT_NEAR(piece.level.volume() / volume, 1, 1e-10);
+      const double volume = signedVolume(marchingCubes(*piece.level->toBricks()));
+      EXPECT_NEAR(piece.level->volume() / volume, 1, 1e-10);
     }
   };
   check(ballInPieces(9, 0.04f));
-  CutOptions options{.voxelSize = 0.05f, .box = kBall, .kerf = 0.06f};
-  options.cells = scatteredPoints(sphere({0, 0, 0}, 1), kBall, 12, 1);
-  check(cutIntoPieces(sphere({0, 0, 0}, 1), options));
+  check(cutIntoLevelSets(sphere({0, 0, 0}, 1), {.voxelSize = 0.05f, .box = kBall},
+                         {.cells = scatteredPoints(sphere({0, 0, 0}, 1), kBall, 12, 1)}, {.kerf = 0.06f}));
   const ScalarField speckled = sphere({0, 0, 0}, 1) + 0.3f * noise({.frequency = 9});
-  check(cutIntoPieces(speckled, {.voxelSize = 0.05f, .box = kBall, .bandVoxels = 7}));
+  check(cutIntoLevelSets(speckled, {.voxelSize = 0.05f, .box = kBall, .bandVoxels = 7}, {}));
 }
 
 TEST(PieceVolumes, OfAShapeThatItsBoxCutsOffAreThoseOfTheMeshes) {
   const Box half{{-0.1f, -1, -1}, {1, 1, 1}};
   for (const float shift : {0.0f, 0.31f, 0.57f}) {
-    CutOptions options{.voxelSize = 0.07f, .box = Box{half.min + Vec3f{shift, shift, 0}, half.max}};
-    options.knives = {flatKnife({{0.3f, 0, 0}, {1, 0.2f, 0.1f}})};
-    for (const Piece& piece : cutIntoPieces(sphere({0, 0, 0}, 1), options).pieces)
-      EXPECT_NEAR(piece.level.volume() / signedVolume(marchingCubes(*piece.level.toBricks())), 1, 1e-10)
+    const Pieces cut = cutIntoLevelSets(
+        sphere({0, 0, 0}, 1), {.voxelSize = 0.07f, .box = Box{half.min + Vec3f{shift, shift, 0}, half.max}},
+        {.planes = {{{0.3f, 0, 0}, {1, 0.2f, 0.1f}}}});
+    for (const Piece& piece : cut.pieces)
+      EXPECT_NEAR(piece.level->volume() / signedVolume(marchingCubes(*piece.level->toBricks())), 1, 1e-10)
           << shift;
   }
 }

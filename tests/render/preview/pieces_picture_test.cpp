@@ -17,9 +17,9 @@ double apart(const Vec3f& a, const Vec3f& b) {
                     std::cbrt(double(a.z)) - std::cbrt(double(b.z)));
 }
 
-PieceSet halves() {
+Pieces halves() {
   const std::vector<CutPart> model{{.mesh = boxMesh({-1, -1, -1}, {1, 1, 1})}};
-  return cutParts(model, {.planes = {{{0, 0, 0}, {0, 1, 0}}}});
+  return cutIntoMeshes(model, {.planes = {{{0, 0, 0}, {0, 1, 0}}}});
 }
 
 TEST(PieceColours, AreAllDifferentAndFarApartWherePiecesTouch) {
@@ -44,7 +44,7 @@ TEST(PieceColours, AreAllDifferentAndFarApartWherePiecesTouch) {
 }
 
 TEST(PiecesPicture, IsTheSameAtAnyThreadCount) {
-  const PieceSet set = halves();
+  const Pieces set = halves();
   const PiecesPictureOptions options{.width = 48, .height = 36, .samples = 8};
   const Image many = picturePieces(set, options);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
