@@ -205,7 +205,7 @@ TEST(LevelSetPieces, KnivesThatCoincideCutOnce) {
 }
 
 TEST(LevelSetPieces, AKnifeMayCoincideWithTheSurface) {
-  // Refused by cutMesh, which has to bring two meshes together.
+  // Refused of meshes, where two of them have to be brought together.
   const auto level = ball(16);
   for (const Pieces& cut : {cutIntoMeshes(*level, {.fields = {gridField(level)}}),
                             cutIntoMeshes(*level, {.fields = {Knife(sphere({0, 0, 0}, 1))}})}) {

@@ -37,7 +37,7 @@ std::vector<CutPart> partsOf(const Pieces& set) {
   return parts;
 }
 
-TEST(PieceSet, ContactsAreFoundAcrossAnEarlierCut) {
+TEST(CutParts, ContactsAreFoundAcrossAnEarlierCut) {
   const std::vector<CutPart> model{{.mesh = icosphere(1, 3)}};
   const Pieces first = cutIntoMeshes(model, {.planes = {kAcrossX}});
   ASSERT_EQ(first.pieces.size(), 2u);
@@ -56,7 +56,7 @@ TEST(PieceSet, ContactsAreFoundAcrossAnEarlierCut) {
   EXPECT_EQ(again.pieces[3].parent, "piece_0002");
 }
 
-TEST(PieceSet, PartsThatNoKnifeTouchesStayAsTheyAre) {
+TEST(CutParts, PartsThatNoKnifeTouchesStayAsTheyAre) {
   const std::vector<CutPart> model{{.mesh = boxMesh({-1, -1, -1}, {1, 1, 1})}};
   const Pieces first = cutIntoMeshes(model, {.planes = {kAcrossX}});
   const Pieces again = cutIntoMeshes(partsOf(first), {.planes = {{{0.5f, 0, 0}, {1, 0, 0}}}});
@@ -71,7 +71,7 @@ TEST(PieceSet, PartsThatNoKnifeTouchesStayAsTheyAre) {
   EXPECT_EQ(missed.pieces[0].name, "piece_0001");
 }
 
-TEST(PieceSet, RefusesNamesThatWouldBeGivenTwice) {
+TEST(CutParts, RefusesNamesThatWouldBeGivenTwice) {
   std::vector<CutPart> parts{{.name = "a", .parent = "", .mesh = boxMesh({-1, -1, -1}, {1, 1, 1})},
                              {.name = "a_0001", .parent = "", .mesh = boxMesh({5, -1, -1}, {7, 1, 1})}};
   EXPECT_THROW(cutIntoMeshes(parts, {.planes = {kAcrossX}}), Error);
@@ -80,7 +80,7 @@ TEST(PieceSet, RefusesNamesThatWouldBeGivenTwice) {
   EXPECT_THROW(cutIntoMeshes(std::vector<CutPart>{}, {}), Error);
 }
 
-TEST(PieceSet, MovesPiecesApartFromTheMiddleOfAll) {
+TEST(CutParts, MovesPiecesApartFromTheMiddleOfAll) {
   const std::vector<CutPart> model{{.mesh = boxMesh({-1, 0, 0}, {3, 1, 1})}};
   const Pieces set = cutIntoMeshes(model, {.planes = {kAcrossX}});
   // Centroids at x = -0.5 and 1.5, of all at 1.
