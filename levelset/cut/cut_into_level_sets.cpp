@@ -9,10 +9,10 @@
 #include <cmath>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/levelset/cut/detail/flat_cut.h"
+#include "nephele/levelset/cut/detail/level_sets/piece_samples.h"
+#include "nephele/levelset/cut/detail/level_sets/shell_necks.h"
 #include "nephele/levelset/cut/detail/piece_measures.h"
-#include "nephele/levelset/cut/detail/piece_samples.h"
-#include "nephele/levelset/cut/detail/shell_necks.h"
+#include "nephele/levelset/cut/detail/solids/flat_cut.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {

@@ -15,10 +15,10 @@
 #include <tuple>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/levelset/cut/detail/flat_cut.h"
-#include "nephele/levelset/cut/detail/lattice_carve.h"
-#include "nephele/levelset/cut/detail/level_set_cut.h"
 #include "nephele/levelset/cut/detail/piece_measures.h"
+#include "nephele/levelset/cut/detail/solids/flat_cut.h"
+#include "nephele/levelset/cut/detail/tetrahedra/lattice_carve.h"
+#include "nephele/levelset/cut/detail/tetrahedra/level_set_cut.h"
 #include "nephele/levelset/cut/marching_tetrahedra.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/noise/noise_draw.h"

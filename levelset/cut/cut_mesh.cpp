@@ -3,8 +3,8 @@
 #include <numeric>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/levelset/cut/detail/flat_cut.h"
 #include "nephele/levelset/cut/detail/piece_measures.h"
+#include "nephele/levelset/cut/detail/solids/flat_cut.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {

@@ -14,8 +14,8 @@
 #include <numeric>
 #include <set>
 
-#include "nephele/levelset/cut/detail/level_set_cut.h"
 #include "nephele/levelset/cut/detail/piece_measures.h"
+#include "nephele/levelset/cut/detail/tetrahedra/level_set_cut.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "nephele/levelset/cut/detail/lattice_carve.h"
+#include "nephele/levelset/cut/detail/tetrahedra/lattice_carve.h"
 
 namespace nephele {
 namespace {

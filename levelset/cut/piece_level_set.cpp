@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "nephele/levelset/cut/detail/cut_kernels.h"
+#include "nephele/levelset/cut/detail/level_sets/cut_kernels.h"
 #include "nephele/levelset/grid/memory_chunks.h"
 #include "nephele/levelset/mesh/brick_volume.h"
 #include "nephele/modeling/base/parallel.h"

@@ -14,51 +14,35 @@
 #include <numbers>
 #include <numeric>
 
+#include "nephele/levelset/grid/disjoint_sets.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 
 namespace nephele::detail {
 namespace {
 
+/// Sets of faces that are as they are or turned: 2 f stands for face f as it is, 2 f + 1 for the same turned.
 class ParitySets {
  public:
-  explicit ParitySets(std::size_t count) : parent_(count), parity_(count) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-  }
+  explicit ParitySets(std::size_t count) : sets_(2 * count) {}
   struct Root {
     std::uint32_t set;
     bool odd;
   };
   Root find(std::uint32_t i) {
-    std::uint32_t root = i;
-    bool odd = false;
-    while (parent_[root] != root) {
-      odd ^= parity_[root];
-      root = parent_[root];
-    }
-    const Root result{root, odd};
-    while (parent_[i] != root && i != root) {
-      const std::uint32_t next = parent_[i];
-      const bool step = parity_[i];
-      parent_[i] = root;
-      parity_[i] = odd;
-      odd ^= step;
-      i = next;
-    }
-    return result;
+    const std::uint32_t root = sets_.root(2 * i);
+    return {root / 2, root % 2 != 0};
   }
   // False if the two are joined already with the other parity.
   bool join(std::uint32_t a, std::uint32_t b, bool differ) {
-    const Root x = find(a), y = find(b);
-    if (x.set == y.set) return (x.odd != y.odd) == differ;
-    const std::uint32_t low = std::min(x.set, y.set), high = std::max(x.set, y.set);
-    parent_[high] = low;
-    parity_[high] = (x.odd != y.odd) != differ;
+    const std::uint32_t turn = differ ? 1 : 0;
+    if (sets_.root(2 * a) == sets_.root(2 * b + 1 - turn)) return false;
+    sets_.join(2 * a, 2 * b + turn);
+    sets_.join(2 * a + 1, 2 * b + 1 - turn);
     return true;
   }
 
  private:
-  std::vector<std::uint32_t> parent_;
-  std::vector<bool> parity_;
+  DisjointSets sets_;
 };
 
 struct Side {

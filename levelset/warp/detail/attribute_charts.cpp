@@ -14,14 +14,11 @@
 #include <numeric>
 #include <span>
 
+#include "nephele/levelset/grid/disjoint_sets.h"
+
 namespace nephele::detail {
 
 namespace {
-
-std::uint32_t rootOf(std::vector<std::uint32_t>& parents, std::uint32_t i) {
-  while (parents[i] != i) i = parents[i] = parents[parents[i]];
-  return i;
-}
 
 struct Edge {
   std::uint32_t low, high;
@@ -107,8 +104,7 @@ AttributeCharts::AttributeCharts(const Mesh& mesh, const MeshAttribute& attribut
       if (isNone[vertex[mesh.corners[c]]]) poles_[c] = -1;
   }
 
-  std::vector<std::uint32_t> parents(triangleCount);
-  std::iota(parents.begin(), parents.end(), 0u);
+  DisjointSets charts(triangleCount);
   std::vector<std::array<std::uint32_t, 2>> apart;
   for (std::size_t e = 0; e < edges.size();) {
     if (!isPairAt(e)) {
@@ -123,14 +119,13 @@ AttributeCharts::AttributeCharts(const Mesh& mesh, const MeshAttribute& attribut
     }
     beyond_[a] = b / 3;
     beyond_[b] = a / 3;
-    const std::uint32_t ra = rootOf(parents, a / 3), rb = rootOf(parents, b / 3);
-    parents[std::max(ra, rb)] = std::min(ra, rb);
+    charts.join(a / 3, b / 3);
   }
 
   // The root of a chart is its first triangle.
   chart_.resize(triangleCount);
   for (std::uint32_t t = 0; t < triangleCount; ++t) {
-    const std::uint32_t root = rootOf(parents, t);
+    const std::uint32_t root = charts.root(t);
     chart_[t] = root == t ? std::uint32_t(chartCount_++) : chart_[root];
   }
 

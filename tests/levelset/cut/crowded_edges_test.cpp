@@ -1,4 +1,4 @@
-#include "nephele/levelset/cut/detail/crowded_edges.h"
+#include "nephele/levelset/cut/detail/solids/crowded_edges.h"
 
 #include <gtest/gtest.h>
 

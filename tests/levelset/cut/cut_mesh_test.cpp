@@ -417,6 +417,26 @@ TEST(MeshPieces, DoNotDependOnTheNumberOfThreads) {
   }
 }
 
+TEST(MeshPieces, OfPlanesAloneDoNotDependOnTheNumberOfThreads) {
+  // Large enough that parts of it go to several threads.
+  const Mesh ball = icosphere(1, 6);
+  const Knives knives{.planes = randomBlades({.count = 12, .box = boundingBox(ball), .seed = 2})};
+  const Pieces cut = cutIntoMeshes(ball, knives);
+  expectSound(ball, cut);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const Pieces again = cutIntoMeshes(ball, knives);
+  ASSERT_EQ(cut.pieces.size(), again.pieces.size());
+  for (std::size_t i = 0; i < cut.pieces.size(); ++i) {
+    EXPECT_EQ(cut.pieces[i].code, again.pieces[i].code);
+    EXPECT_EQ(cut.pieces[i].mesh.positions, again.pieces[i].mesh.positions);
+    EXPECT_EQ(cut.pieces[i].mesh.corners, again.pieces[i].mesh.corners);
+    // By code, the negative side first.
+    if (i > 0) {
+      EXPECT_LE(cut.pieces[i - 1].code.sides, cut.pieces[i].code.sides);
+    }
+  }
+}
+
 TEST(MeshPieces, RefuseWhatCannotBeCut) {
   Mesh open = cube();
   open.corners.resize(33);

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/levelset/cut/detail/cut_kernels.h"
+#include "nephele/levelset/cut/detail/level_sets/cut_kernels.h"
 #include "nephele/levelset/grid/brick_mask.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
