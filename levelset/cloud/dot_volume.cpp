@@ -5,13 +5,16 @@
 // The points of a smeared dot are sorted in runs of four voxels: a brick adds those of a run that it holds.
 //
 // A batch of splats is sorted by brick: a splat has an entry in every brick that it touches (1.4 on average).
-// Counting and placing entries use atomic counters on a dense table over the box of the bricks; each brick
+// Counting and placing entries use atomic counters beside the numbers of a sparse table of bricks; each brick
 // then sorts its entries by number, which makes the order that of the input whatever the threads did, and
 // adds them up, alone. Samples are kept in the order of OpenVDB's leaves, so that writing copies them.
 //
+// Places are computed in double precision, from the dots each time that they are asked for, and kept in
+// single precision only relative to a brick: a dot lands in the right voxel however far from the origin it
+// lies.
+//
 // Source: Tessendorf, Production Volume Rendering (2008), "Baking anti-aliased dots".
-// Limits: the table is dense, 8 bytes per brick position; sums are single precision, so a voxel that collects
-// n dots is off by some sqrt(n) roundings.
+// Limits: sums are single precision, so a voxel that collects n dots is off by some sqrt(n) roundings.
 #include "nephele/levelset/cloud/dot_volume.h"
 
 #include <fmt/format.h>
@@ -21,8 +24,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/grid/sparse_bricks.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_assembly.h"
 #include "nephele/modeling/base/parallel.h"
@@ -30,25 +33,20 @@
 namespace nephele {
 namespace {
 
-constexpr int kBrick = BrickGrid::kBrick;
+constexpr int kBrick = kBrickSide;
 constexpr std::size_t kVoxels = std::size_t(kBrick) * kBrick * kBrick;
-constexpr double kLargestTable = double(1 << 28);
 /// Voxels are numbered from -kFarthest to kFarthest along each axis.
-constexpr float kFarthest = 1e9f;
+constexpr double kFarthest = 1e9;
 /// Entries (of splats in bricks) that are sorted at a time, on average.
 constexpr double kBatch = double(1 << 20);
 /// Points of a smeared dot that are sorted as one, two per voxel.
 constexpr std::size_t kRun = 8;
 /// Dots that a thread takes at a time.
 constexpr std::size_t kPiece = 1 << 13;
-/// Bricks whose samples are allocated at a time.
-constexpr std::size_t kBlock = 512;
-/// Positions added on every side when the table grows, so that it grows rarely.
-constexpr int kGrowth = 4;
 
-/// A dot at rest, or a part of the way of one that is smeared.
+/// A dot at rest, or a part of the way of one that is smeared, in a brick that it touches.
 struct Splat {
-  Vec3f q;        ///< Index space; of a smeared dot, where the part begins.
+  Vec3f q;        ///< Index space, from the brick's first voxel; of a smeared dot, where the part begins.
   float density;  ///< Of each of its points.
   std::uint32_t dot;
   std::uint32_t number;  ///< In the order in which splats are added.
@@ -146,21 +144,25 @@ struct BrickSpan {
 };
 
 /// Without a call of std::floor, which needs instructions that not every machine has.
-int floorOf(float x) {
+template <class Real>
+int floorOf(Real x) {
   const int whole = int(x);
-  return whole - int(x < float(whole));
+  return whole - int(x < Real(whole));
 }
-Vec3i floorOf(const Vec3f& q) {
-  return {floorOf(q.x), floorOf(q.y), floorOf(q.z)};
+template <class Vector>
+Vec3i floorOf(const Vector& q) requires requires {
+  q.x;
 }
+{ return {floorOf(q.x), floorOf(q.y), floorOf(q.z)}; }
 
-BrickSpan bricksOf(const Vec3f& q, int reach) {
+BrickSpan bricksOf(const Vec3d& q, int reach) {
   const Vec3i low = floorOf(q), r{reach, reach, reach};
   return {brickOf(low - r), brickOf(low + r + Vec3i{1, 1, 1})};
 }
 
 /// At least `count` values, whatever they are; grows rarely.
-void makeRoom(std::vector<Splat>& values, std::size_t count) {
+template <class T>
+void makeRoom(std::vector<T>& values, std::size_t count) {
   if (values.size() >= count) return;
   values = {};
   detail::resizeLarge(values, count + count / 4);
@@ -178,29 +180,26 @@ std::string shown(const Vec3f& v) {
 
 struct DotVolume::Impl {
   DotVolumeOptions options;
+  double perIndex = 1;  ///< 1 / edge of a voxel.
   float perVoxel = 1;   ///< 1 / volume of a voxel.
   float ownRadius = 0;  ///< Of dots that bring none, voxels.
   int ownReach = 0;
   std::uint64_t dotCount = 0;
   double mass = 0;
 
-  BrickBox bricks;
-  std::vector<std::int32_t> slots;      ///< Per brick position: number of its samples, or -1.
-  std::vector<std::uint32_t> counters;  ///< Per brick position: all 0 between batches.
-  std::vector<std::unique_ptr<float[]>> blocks;
-  std::size_t slotCount = 0;
+  detail::SparseBricks<float> bricks;
+  std::vector<std::uint32_t> counters;  ///< Per place of the bricks' table: all 0 between batches.
 
   // Working memory of a batch.
   std::vector<std::size_t> firstSplat;  ///< Of each dot, and after the last.
-  std::vector<Splat> splats;
+  std::vector<std::uint32_t> dotOfSplat;
   std::size_t splatCount = 0;
   std::vector<Splat> entries;
 
+  explicit Impl(const DotVolumeOptions& o)
+      : options(o), bricks("dots", (o.withColor ? 4 : 1) * kVoxels), perIndex(1.0 / double(o.voxelSize)) {}
+
   std::size_t channels() const { return options.withColor ? 4 : 1; }
-  float* samples(std::int32_t slot) const {
-    return blocks[std::size_t(slot) / kBlock].get() + std::size_t(slot) % kBlock * channels() * kVoxels;
-  }
-  std::int32_t slotOf(const Vec3i& b) const { return bricks.covers(b) ? slots[bricks.numberOf(b)] : -1; }
 
   float radiusVoxels(const DotSpans& dots, std::size_t i) const {
     return dots.radii.empty() ? ownRadius : dots.radii[i] / options.voxelSize;
@@ -226,17 +225,16 @@ struct DotVolume::Impl {
     Vec3d start, step;
     std::size_t count;
 
-    Vec3f point(std::size_t k) const {
+    Vec3d point(std::size_t k) const {
       constexpr double kSide = 0.5 * std::numbers::inv_sqrt3;
       const double place = double(k / 2) + 0.5 + (count == 1 ? 0 : k % 2 ? kSide : -kSide);
-      return Vec3f(start + step * place);
+      return start + step * place;
     }
   };
   Way wayOf(const DotSpans& dots, std::size_t i) const {
-    const double scale = 1.0 / double(options.voxelSize);
-    Way way{Vec3d(dots.positions[i]) * scale, {}, pointsOf(dots, i)};
+    Way way{Vec3d(dots.positions[i]) * perIndex, {}, pointsOf(dots, i)};
     if (!smears(dots)) return way;
-    const Vec3d v = Vec3d(dots.velocities[i]) * scale;
+    const Vec3d v = Vec3d(dots.velocities[i]) * perIndex;
     const double open = double(options.shutterOpen), close = double(options.shutterClose);
     way.start += v * open;
     way.step = v * ((close - open) / (way.count == 1 ? 1.0 : double(way.count / 2)));
@@ -246,28 +244,40 @@ struct DotVolume::Impl {
   struct Run {
     std::size_t begin, end;
   };
-  Run runOf(const Splat& splat, const Way& way) const {
-    const std::size_t begin = (splat.number - firstSplat[splat.dot]) * kRun;
+  Run runOf(std::size_t splat, std::size_t dot, const Way& way) const {
+    const std::size_t begin = (splat - firstSplat[dot]) * kRun;
     return {begin, std::min(begin + kRun, way.count)};
   }
   /// The bricks that a splat touches, and some more if it is smeared aslant.
-  BrickSpan bricksAt(const DotSpans& dots, const Splat& splat) const {
-    const int extent = reach(dots, splat.dot);
-    BrickSpan span = bricksOf(splat.q, extent);
-    if (!smears(dots)) return span;
-    const Way way = wayOf(dots, splat.dot);
-    const BrickSpan last = bricksOf(way.point(runOf(splat, way).end - 1), extent);
+  BrickSpan bricksAt(const DotSpans& dots, std::size_t dot, const Way& way, const Run& run) const {
+    const int extent = reach(dots, dot);
+    const BrickSpan span = bricksOf(way.point(run.begin), extent);
+    if (run.end - run.begin < 2) return span;
+    const BrickSpan last = bricksOf(way.point(run.end - 1), extent);
     return {min(span.first, last.first), max(span.last, last.last)};
+  }
+  /// visit(brick, q, splat, dot, points) for every brick that each of some splats touches, q being where it
+  /// begins.
+  template <class Visit>
+  void forEntries(const DotSpans& dots, std::size_t begin, std::size_t end, const Visit& visit) const {
+    for (std::size_t s = begin; s < end; ++s) {
+      const std::size_t dot = dotOfSplat[s];
+      const Way way = wayOf(dots, dot);
+      const Run run = runOf(s, dot, way);
+      bricksAt(dots, dot, way, run).forEach([&](const Vec3i& brick) {
+        visit(brick, way.point(run.begin), s, dot, way.count);
+      });
+    }
   }
 
   const float* sampleAt(const Vec3i& voxel) const;
   void requireSound(const DotSpans& dots) const;
   void addBatch(const DotSpans& dots, const Progress& progress);
-  BrickSpan makeSplats(const DotSpans& dots);
-  void cover(const BrickSpan& span);
+  void makeSplats(const DotSpans& dots);
+  void makePlaces(const DotSpans& dots);
   std::vector<std::size_t> countEntries(const DotSpans& dots);
   template <bool hasColor>
-  void sumBrick(const DotSpans& dots, std::size_t position, Splat* first, Splat* last) const;
+  void sumBrick(const DotSpans& dots, std::size_t place, Splat* first, Splat* last) const;
 };
 
 void DotVolume::Impl::requireSound(const DotSpans& dots) const {
@@ -283,7 +293,7 @@ void DotVolume::Impl::requireSound(const DotSpans& dots) const {
                               kLargestRadius * h, kLargestRadius));
       if (!dots.colors.empty() && !isFinite(dots.colors[i]))
         refuse(i, "has the colour " + shown(dots.colors[i]) + ", which must be finite");
-      float reach = kLargestRadius;
+      double reach = double(kLargestRadius);
       if (!dots.velocities.empty()) {
         if (!isFinite(dots.velocities[i]))
           refuse(i, "has the velocity " + shown(dots.velocities[i]) + ", which must be finite");
@@ -292,11 +302,12 @@ void DotVolume::Impl::requireSound(const DotSpans& dots) const {
             refuse(i, fmt::format("is smeared over {:g} voxels, allowed: up to {:g}; use a shorter shutter "
                                   "or larger voxels",
                                   way, kLongestSmear));
-          reach += length(dots.velocities[i]) *
-                   std::max(std::abs(options.shutterOpen), std::abs(options.shutterClose)) / h;
+          reach += double(length(dots.velocities[i])) *
+                   double(std::max(std::abs(options.shutterOpen), std::abs(options.shutterClose))) * perIndex;
         }
       }
-      const float farthest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / h + reach;
+      const double farthest =
+          double(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)})) * perIndex + reach;
       if (!(farthest <= kFarthest))
         refuse(i, fmt::format("at {} is {:g} voxels from the origin, allowed: up to {:g}", shown(p), farthest,
                               kFarthest));
@@ -304,51 +315,35 @@ void DotVolume::Impl::requireSound(const DotSpans& dots) const {
   });
 }
 
-BrickSpan DotVolume::Impl::makeSplats(const DotSpans& dots) {
+void DotVolume::Impl::makeSplats(const DotSpans& dots) {
   splatCount = firstSplat.back();
-  makeRoom(splats, splatCount);
-  const std::size_t pieces = (dots.size() + kPiece - 1) / kPiece;
-  std::vector<BrickSpan> spans(pieces);
-  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
-    const std::size_t begin = piece * kPiece, end = std::min(begin + kPiece, dots.size());
-    BrickSpan span{};
-    for (std::size_t i = begin; i < end; ++i) {
-      const Way way = wayOf(dots, i);
-      const double own = double(dots.masses.empty() ? 1.0f : dots.masses[i]);
-      const float density = float(own * double(perVoxel) / double(way.count));
-      for (std::size_t n = firstSplat[i]; n < firstSplat[i + 1]; ++n) {
-        splats[n] = {way.point((n - firstSplat[i]) * kRun), density, std::uint32_t(i), std::uint32_t(n)};
-        const BrickSpan touched = bricksAt(dots, splats[n]);
-        span = n == firstSplat[begin]
-                   ? touched
-                   : BrickSpan{min(span.first, touched.first), max(span.last, touched.last)};
-      }
-    }
-    spans[piece] = span;
+  makeRoom(dotOfSplat, splatCount);
+  parallelFor(dots.size(), kPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      std::fill(dotOfSplat.begin() + std::ptrdiff_t(firstSplat[i]),
+                dotOfSplat.begin() + std::ptrdiff_t(firstSplat[i + 1]), std::uint32_t(i));
   });
-  BrickSpan all = spans.front();
-  for (const BrickSpan& s : spans) all = {min(all.first, s.first), max(all.last, s.last)};
-  return all;
 }
 
-void DotVolume::Impl::cover(const BrickSpan& span) {
-  const BrickBox old = bricks;
-  const bool isEmpty = slots.empty();
-  const Vec3i end = old.first + old.count, one{1, 1, 1}, margin{kGrowth, kGrowth, kGrowth};
-  if (!isEmpty && min(old.first, span.first) == old.first && max(end, span.last + one) == end) return;
-  Vec3i low = span.first - margin, high = span.last + one + margin;
-  if (!isEmpty) {
-    low = min(low, old.first);
-    high = max(high, end);
-  }
-  const Vec3i count = high - low;
-  require(
-      double(count.x) * count.y * count.z <= kLargestTable,
-      fmt::format("dots: they are spread over {} x {} x {} voxels, more than can be held; use larger voxels",
-                  8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
-  bricks = {low, count};
-  slots = enlarged(slots, old, bricks);
-  counters.assign(bricks.size(), 0);
+/// Makes places for all bricks that splats touch.
+void DotVolume::Impl::makePlaces(const DotSpans& dots) {
+  const detail::BrickTable& table = bricks.table();
+  const std::size_t pieces = (splatCount + kPiece - 1) / kPiece;
+  std::vector<std::vector<Vec3i>> missing(pieces);
+  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
+    std::vector<Vec3i>& found = missing[piece];
+    forEntries(dots, piece * kPiece, std::min((piece + 1) * kPiece, splatCount),
+               [&](const Vec3i& b, auto&&...) {
+                 // One brick stands for all of its cube.
+                 const Vec3i cube{b.x & ~7, b.y & ~7, b.z & ~7};
+                 if (!table.includes(b) && (found.empty() || found.back() != cube)) found.push_back(cube);
+               });
+    std::sort(found.begin(), found.end(), comesBefore);
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+  });
+  for (const std::vector<Vec3i>& found : missing)
+    for (const Vec3i& brick : found) bricks.table().include(brick);
+  counters.resize(table.placeCount(), 0);
 }
 
 /// Counts the entries of every brick and returns the bricks that have some, in the order of the table.
@@ -356,13 +351,12 @@ std::vector<std::size_t> DotVolume::Impl::countEntries(const DotSpans& dots) {
   const std::size_t pieces = (splatCount + kPiece - 1) / kPiece;
   std::vector<std::vector<std::size_t>> found(pieces);
   parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
-    const std::size_t end = std::min((piece + 1) * kPiece, splatCount);
-    for (std::size_t s = piece * kPiece; s < end; ++s)
-      bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
-        const std::size_t i = bricks.numberOf(b);
-        if (std::atomic_ref(counters[i]).fetch_add(1, std::memory_order_relaxed) == 0)
-          found[piece].push_back(i);
-      });
+    forEntries(dots, piece * kPiece, std::min((piece + 1) * kPiece, splatCount),
+               [&](const Vec3i& b, auto&&...) {
+                 const std::size_t place = bricks.table().placeOf(b);
+                 if (std::atomic_ref(counters[place]).fetch_add(1, std::memory_order_relaxed) == 0)
+                   found[piece].push_back(place);
+               });
   });
   std::vector<std::size_t> touched;
   std::size_t count = 0;
@@ -380,22 +374,22 @@ std::vector<std::size_t> DotVolume::Impl::countEntries(const DotSpans& dots) {
 }
 
 template <bool hasColor>
-void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t position, Splat* first, Splat* last) const {
+void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t place, Splat* first, Splat* last) const {
   const auto isBefore = [](const Splat& a, const Splat& b) { return a.number < b.number; };
   if (!std::is_sorted(first, last, isBefore)) std::sort(first, last, isBefore);
-  const Vec3i origin = bricks.at(position) * kBrick;
-  const BrickSums<hasColor> sums{samples(slots[position])};
+  const Vec3d origin(bricks.table().brickAt(place) * kBrick);
+  const BrickSums<hasColor> sums{bricks.samples(bricks.table()[place])};
   const bool smeared = smears(dots);
   for (; first != last; ++first) {
     const std::size_t dot = first->dot;
     const Vec3f color = dots.colors.empty() ? Vec3f{1, 1, 1} : dots.colors[dot];
     const Way way = smeared ? wayOf(dots, dot) : Way{};
-    const Run run = smeared ? runOf(*first, way) : Run{0, 1};
+    const Run run = smeared ? runOf(first->number, dot, way) : Run{0, 1};
     if (reach(dots, dot) == 0) {
       for (std::size_t k = run.begin; k < run.end; ++k) {
-        const Vec3f q = k == run.begin ? first->q : way.point(k);
+        const Vec3f q = k == run.begin ? first->q : Vec3f(way.point(k) - origin);
         const Vec3i voxel = floorOf(q);
-        sums.addSmall(voxel - origin, q - Vec3f(voxel), first->density, color);
+        sums.addSmall(voxel, q - Vec3f(voxel), first->density, color);
       }
       continue;
     }
@@ -403,43 +397,44 @@ void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t position, Splat
     const Vec3i reach{kernel.reach, kernel.reach, kernel.reach};
     float wx[kMostWeights], wy[kMostWeights], wz[kMostWeights];
     for (std::size_t k = run.begin; k < run.end; ++k) {
-      const Vec3f q = k == run.begin ? first->q : way.point(k);
+      const Vec3f q = k == run.begin ? first->q : Vec3f(way.point(k) - origin);
       const Vec3i voxel = floorOf(q);
       kernel.weights(q.x - float(voxel.x), wx);
       kernel.weights(q.y - float(voxel.y), wy);
       kernel.weights(q.z - float(voxel.z), wz);
-      sums.addBox(voxel - origin - reach, 2 * kernel.reach + 2, wx, wy, wz, first->density, color);
+      sums.addBox(voxel - reach, 2 * kernel.reach + 2, wx, wy, wz, first->density, color);
     }
   }
 }
 
 void DotVolume::Impl::addBatch(const DotSpans& dots, const Progress& progress) {
-  cover(makeSplats(dots));
+  makeSplats(dots);
+  makePlaces(dots);
   const std::vector<std::size_t> touched = countEntries(dots);
-  const std::size_t oldSlots = slotCount;
+  const std::size_t oldBricks = bricks.count();
+  detail::BrickTable& table = bricks.table();
   std::vector<std::size_t> starts(touched.size() + 1, 0);
   for (std::size_t k = 0; k < touched.size(); ++k) {
     starts[k + 1] = starts[k] + counters[touched[k]];
     counters[touched[k]] = std::uint32_t(starts[k]);
-    std::int32_t& slot = slots[touched[k]];
-    if (slot >= 0) continue;
     // Its samples are set to 0 by the thread that adds to them first.
-    if (slotCount % kBlock == 0)
-      blocks.push_back(std::make_unique_for_overwrite<float[]>(kBlock * channels() * kVoxels));
-    slot = std::int32_t(slotCount++);
+    if (table[touched[k]] < 0) bricks.addAt(touched[k]);
   }
   makeRoom(entries, starts.back());
   parallelFor(splatCount, kPiece, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s)
-      bricksAt(dots, splats[s]).forEach([&](const Vec3i& b) {
-        entries[std::atomic_ref(counters[bricks.numberOf(b)]).fetch_add(1, std::memory_order_relaxed)] =
-            splats[s];
-      });
+    forEntries(
+        dots, begin, end,
+        [&](const Vec3i& b, const Vec3d& q, std::size_t s, std::size_t dot, std::size_t points) {
+          const double own = double(dots.masses.empty() ? 1.0f : dots.masses[dot]);
+          const float density = float(own * double(perVoxel) / double(points));
+          entries[std::atomic_ref(counters[table.placeOf(b)]).fetch_add(1, std::memory_order_relaxed)] = {
+              Vec3f(q - Vec3d(b * kBrick)), density, std::uint32_t(dot), std::uint32_t(s)};
+        });
   });
   parallelFor(touched.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const std::int32_t slot = slots[touched[k]];
-      if (std::size_t(slot) >= oldSlots) std::fill_n(samples(slot), channels() * kVoxels, 0.0f);
+      const std::int32_t brick = table[touched[k]];
+      if (std::size_t(brick) >= oldBricks) std::fill_n(bricks.samples(brick), channels() * kVoxels, 0.0f);
       Splat* const first = entries.data() + starts[k];
       Splat* const last = entries.data() + starts[k + 1];
       if (options.withColor)
@@ -452,7 +447,7 @@ void DotVolume::Impl::addBatch(const DotSpans& dots, const Progress& progress) {
   progress.check();
 }
 
-DotVolume::DotVolume(const DotVolumeOptions& o) : impl_(std::make_unique<Impl>()) {
+DotVolume::DotVolume(const DotVolumeOptions& o) : impl_(std::make_unique<Impl>(o)) {
   require(o.voxelSize > 0 && std::isfinite(o.voxelSize),
           fmt::format("dots: voxelSize must be > 0 and finite, got {:g}", o.voxelSize));
   require(o.radius >= 0 && o.radius <= kLargestRadius * o.voxelSize,
@@ -461,7 +456,6 @@ DotVolume::DotVolume(const DotVolumeOptions& o) : impl_(std::make_unique<Impl>()
   require(std::isfinite(o.shutterOpen) && std::isfinite(o.shutterClose) && o.shutterOpen <= o.shutterClose,
           fmt::format("dots: the shutter must open before it closes, both finite, got {:g} and {:g}",
                       o.shutterOpen, o.shutterClose));
-  impl_->options = o;
   impl_->ownRadius = o.radius / o.voxelSize;
   impl_->ownReach = reachOf(impl_->ownRadius);
   impl_->perVoxel = float(1 / (double(o.voxelSize) * double(o.voxelSize) * double(o.voxelSize)));
@@ -496,10 +490,10 @@ void DotVolume::add(const DotSpans& dots, const Progress& progress) {
 }
 
 const float* DotVolume::Impl::sampleAt(const Vec3i& voxel) const {
-  const std::int32_t slot = slotOf(brickOf(voxel));
-  if (slot < 0) return nullptr;
+  const float* const own = bricks.find(brickOf(voxel));
+  if (!own) return nullptr;
   const int i = (insideBrick(voxel.x) * kBrick + insideBrick(voxel.y)) * kBrick + insideBrick(voxel.z);
-  return samples(slot) + std::size_t(i) * channels();
+  return own + std::size_t(i) * channels();
 }
 
 float DotVolume::density(const Vec3i& voxel) const {
@@ -522,14 +516,13 @@ double DotVolume::mass() const {
 }
 
 std::size_t DotVolume::brickCount() const {
-  return impl_->slotCount;
+  return impl_->bricks.count();
 }
 
 std::size_t DotVolume::memoryBytes() const {
-  const std::size_t samples = kVoxels * impl_->channels() * sizeof(float);
-  return impl_->blocks.size() * kBlock * samples + impl_->slotCount * samples +
-         impl_->slots.size() * (sizeof(std::int32_t) + sizeof(std::uint32_t)) +
-         impl_->splats.capacity() * sizeof(Splat) + impl_->entries.capacity() * sizeof(Splat);
+  const std::size_t grids = impl_->bricks.count() * impl_->bricks.samplesPerBrick() * sizeof(float);
+  return impl_->bricks.memoryBytes() + grids + impl_->counters.capacity() * sizeof(std::uint32_t) +
+         impl_->dotOfSplat.capacity() * sizeof(std::uint32_t) + impl_->entries.capacity() * sizeof(Splat);
 }
 
 namespace {
@@ -559,11 +552,11 @@ std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) c
   density->setGridClass(openvdb::GRID_FOG_VOLUME);
   density->setSaveFloatAsHalf(halfFloat);
   density->setTransform(transform->copy());
-  detail::assembleTree(density->tree(), impl_->bricks.first, impl_->bricks.count,
+  const detail::BrickTable& table = impl_->bricks.table();
+  detail::assembleTree(density->tree(), table.bricks().first, table.bricks().count,
                        [&](const Vec3i& position, const openvdb::Coord& origin) -> detail::LeafOrTile {
-                         const std::int32_t slot = impl_->slots[impl_->bricks.numberOf(position)];
-                         if (slot < 0) return {nullptr, 0.0f, false};
-                         const float* const samples = impl_->samples(slot);
+                         const float* const samples = impl_->bricks.find(position);
+                         if (!samples) return {nullptr, 0.0f, false};
                          const auto isActive = [](float v) { return v > 0; };
                          if (impl_->channels() == 1) return detail::leafOf(samples, origin, isActive);
                          float densities[kVoxels];
@@ -578,14 +571,14 @@ std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) c
   color->setName("Cd");
   color->setSaveFloatAsHalf(halfFloat);
   color->setTransform(transform->copy());
-  std::vector<std::unique_ptr<Leaf>> leaves(impl_->slots.size());
+  std::vector<std::unique_ptr<Leaf>> leaves(table.placeCount());
   parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (impl_->slots[i] < 0) continue;
-      const Vec3i origin = impl_->bricks.at(i) * kBrick;
+      if (table[i] < 0) continue;
+      const Vec3i origin = table.brickAt(i) * kBrick;
       leaves[i] =
           std::make_unique<Leaf>(openvdb::Coord(origin.x, origin.y, origin.z), openvdb::Vec3s(0.0f), false);
-      if (!fillColors(impl_->samples(impl_->slots[i]), *leaves[i])) leaves[i].reset();
+      if (!fillColors(impl_->bricks.samples(table[i]), *leaves[i])) leaves[i].reset();
     }
   });
   for (auto& leaf : leaves)
@@ -596,13 +589,16 @@ std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) c
 
 double estimatedDotVolumeBytes(const Box& box, double brickCount, double dotCount,
                                const DotVolumeOptions& options) {
+  // What the table has for one place, for the cubes of 8^3 places that hold bricks: mostly surfaces.
+  constexpr double kPlace = sizeof(std::int32_t) + sizeof(std::uint32_t), kCube = 8;
   const double edge = double(options.voxelSize) * kBrick;
   double positions = 1;
-  for (int axis = 0; axis < 3; ++axis) positions *= double(box.size()[axis]) / edge + 2 * (kGrowth + 1);
+  for (int axis = 0; axis < 3; ++axis) positions *= double(box.size()[axis]) / edge + 2 * kCube;
   const double samples = double(kVoxels) * sizeof(float) * (options.withColor ? 4 : 1);
   const double bricks = std::min(brickCount, positions);
-  // Samples here and in the grids; a table with two numbers, or a number and a colour's leaf; a batch.
-  return 2 * bricks * samples + positions * (2 * sizeof(std::int32_t) + (options.withColor ? 8 : 0)) +
+  const double places = std::min(positions, brickCount * kCube * kCube * kCube);
+  // Samples here and in the grids; a table with two numbers, and a colour's leaf; a batch.
+  return 2 * bricks * samples + places * (kPlace + (options.withColor ? 8 : 0)) +
          std::min(dotCount, kBatch) * 3 * double(sizeof(Splat));
 }
 

@@ -339,7 +339,7 @@ void requireSane(const std::vector<GridHandle>& grids, const AdvectionOptions& o
 GridHandle throughMap(const GridHandle& grid, const FlowMap& map, const Matter& matter,
                       const Progress& progress) {
   if (map.isIdentity()) return grid;
-  detail::BrickNumbers kept;
+  detail::BrickTable kept("advection");
   for (const Vec3i& brick : map.bricks) kept.set(brick, 0);
   const std::vector<Vec3i> seeds = overlapping(matterBricks(map, matter), map.lattice, latticeOf(*grid));
   return readThrough(

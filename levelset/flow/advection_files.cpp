@@ -84,7 +84,7 @@ void forVoxels(const Body& body) {
 }
 
 std::vector<Vec3i> bricksOf(const VectorGrids& grids) {
-  detail::BrickNumbers seen;
+  detail::BrickTable seen("advection");
   std::vector<Vec3i> bricks;
   for (const auto& grid : grids)
     for (int z = 0; z < grid->brickCount.z; ++z)

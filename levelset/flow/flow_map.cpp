@@ -29,8 +29,8 @@ namespace nephele {
 
 namespace {
 
-using detail::BrickNumbers;
 using detail::BrickPoints;
+using detail::BrickTable;
 using detail::kOwnSamples;
 
 /// How far tricubic interpolation reads, in voxels.
@@ -103,7 +103,7 @@ class KeptBricks {
   static constexpr float kLast = BrickGrid::kBrick - 1e-3f;
 
   Lattice lattice_;
-  BrickNumbers table_;
+  BrickTable table_{"advection"};
 };
 
 [[noreturn]] void failNotFinite(const Vec3f& p) {
@@ -119,7 +119,7 @@ Spans<3> spansOf(BrickPoints& points) {
 }  // namespace
 
 struct Matter::Table {
-  BrickNumbers numbers;
+  BrickTable numbers{"advection"};
 };
 
 Matter::Matter(std::span<const std::shared_ptr<const BrickGrid>> grids, const Lattice& lattice)

@@ -23,6 +23,7 @@
 #include <map>
 
 #include "nephele/levelset/grid/brick_samples.h"
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
@@ -44,8 +45,6 @@ constexpr int kCellSize = 8;
 constexpr std::size_t kBatch = 4096;
 /// Beyond this many voxels from the origin floats cannot tell neighbouring voxels apart.
 constexpr double kFarthestVoxel = (1 << 24) - 64;
-/// Table entries are 32-bit, and evaluated bricks stand beside constants in them.
-constexpr double kMostBricks = 2147483647.0;
 
 /// Voxels [first, last], both included.
 struct VoxelBox {
@@ -103,11 +102,7 @@ class Baker {
       places_.first[axis] = brickOf(voxels_.first[axis] - 2);
       places_.count[axis] = brickOf(voxels_.last[axis] + 1) - places_.first[axis] + 1;
     }
-    const double positions = double(places_.count.x) * places_.count.y * places_.count.z;
-    require(positions < kMostBricks,
-            fmt::format(
-                "bake: the box spans {:.4g} bricks of 8^3 voxels of {:g}, but at most {:.4g} are possible",
-                positions, options.voxelSize, kMostBricks));
+    requireHoldable("bake", places_);
   }
 
   Grids grids(const NodePtr<T>& node) {

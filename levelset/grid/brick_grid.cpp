@@ -160,6 +160,7 @@ Interval rangeOfBrick(const float* samples) {
 }
 
 void fillBorders(BrickGrid& grid) {
+  require(!grid.isPacked(), "fillBorders: the grid must not be packed");
   grid.ranges.resize(grid.values.size() / kVolume);
   const std::vector<PlacedBrick> placed = placedBricks(grid);
   parallelFor(placed.size(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
@@ -171,6 +172,7 @@ void fillBorders(BrickGrid& grid) {
 }
 
 std::size_t activeVoxelCount(const BrickGrid& grid, const Interval& band) {
+  require(!grid.isPacked(), "activeVoxelCount: the grid must not be packed");
   std::vector<int> perBrick(grid.poolSize());
   parallelFor(grid.poolSize(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

@@ -2,11 +2,7 @@
 // are asked next. One wave of bricks runs on all cores; what is asked next is decided between waves on one,
 // so the order and the result are fixed. A flow takes a connected body to a connected one: a few seeds inside
 // its image find all of it.
-//
-// Limits: the table of brick positions is dense over the box of the bricks that were asked.
 #include "nephele/levelset/grid/brick_growth.h"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,9 +16,6 @@ namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kWidth = BrickGrid::kWidth;
-constexpr double kLargestTable = double(1 << 28);
-/// Positions added on every side when a table grows, so that it grows rarely.
-constexpr int kGrowth = 6;
 
 template <class Body>
 void forNeighbours(const Vec3i& brick, const Body& body) {
@@ -48,23 +41,6 @@ BrickPoints::BrickPoints(const Lattice& lattice, const Vec3i& brick) {
         set(i, lattice.indexToWorld(Vec3f(brick * kBrick + Vec3i{l, j, k})));
 }
 
-void BrickNumbers::set(const Vec3i& brick, std::int32_t number) {
-  if (!bricks_.covers(brick)) {
-    const Vec3i margin{kGrowth, kGrowth, kGrowth}, one{1, 1, 1};
-    const BrickBox old = bricks_;
-    const bool isEmpty = numbers_.empty();
-    const Vec3i first = isEmpty ? brick - margin : min(old.first, brick - margin);
-    const Vec3i last = isEmpty ? brick + margin : max(old.first + old.count - one, brick + margin);
-    const Vec3i count = last - first + one;
-    require(double(count.x) * count.y * count.z <= kLargestTable,
-            fmt::format("advection: the result spreads over {} x {} x {} voxels, more than can be held",
-                        8.0 * count.x, 8.0 * count.y, 8.0 * count.z));
-    bricks_ = {first, count};
-    numbers_ = enlarged(numbers_, old, bricks_);
-  }
-  numbers_[bricks_.numberOf(brick)] = number;
-}
-
 GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& options,
                        const EvaluateBrick& evaluate, const Progress& progress) {
   const std::size_t stride = std::size_t(options.components) * kOwnSamples;
@@ -72,7 +48,7 @@ GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& opt
   grown.components = options.components;
   std::vector<Vec3i> bricks;
   std::vector<std::uint8_t> matters;
-  BrickNumbers asked;
+  BrickTable asked("advection");
   std::vector<Vec3i> wave;
   const auto ask = [&](const Vec3i& brick) {
     if (asked.at(brick) >= 0) return;
@@ -127,10 +103,10 @@ std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, 
   std::vector<std::shared_ptr<BrickGrid>> grids;
   // With a background outside, bricks beside the grown ones blend towards it.
   std::vector<Vec3i> placed = grown.bricks;
-  BrickNumbers numbers;
+  BrickTable numbers("advection");
   for (std::size_t i = 0; i < grown.bricks.size(); ++i) numbers.set(grown.bricks[i], std::int32_t(i));
   if (beyond == Beyond::background) {
-    BrickNumbers beside;
+    BrickTable beside("advection");
     for (const Vec3i& brick : grown.bricks)
       forNeighbours(brick, [&](const Vec3i& b) {
         if (numbers.at(b) >= 0 || beside.at(b) >= 0) return;

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/lattice.h"
 #include "nephele/modeling/base/progress.h"
 
@@ -15,7 +15,7 @@
 namespace nephele::detail {
 
 /// Samples that a brick has of its own.
-inline constexpr int kOwnSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+inline constexpr int kOwnSamples = kBrickSamples;
 
 /// World positions of the own samples of `brick`, x fastest.
 struct BrickPoints {
@@ -26,23 +26,6 @@ struct BrickPoints {
   void set(int i, const Vec3f& p) {
     x[std::size_t(i)] = p.x, y[std::size_t(i)] = p.y, z[std::size_t(i)] = p.z;
   }
-};
-
-/// A number for each of some bricks: a dense table over their box, which grows.
-class BrickNumbers {
- public:
-  /// The number of `brick`, or -1.
-  std::int32_t at(const Vec3i& brick) const {
-    return bricks_.covers(brick) ? numbers_[bricks_.numberOf(brick)] : -1;
-  }
-  /// @throws Error if the box becomes too large to hold.
-  void set(const Vec3i& brick, std::int32_t number);
-  const Vec3i& first() const { return bricks_.first; }
-  const Vec3i& count() const { return bricks_.count; }
-
- private:
-  BrickBox bricks_;
-  std::vector<std::int32_t> numbers_;
 };
 
 /// Bricks and `components` times kOwnSamples samples of each, one component after the other.

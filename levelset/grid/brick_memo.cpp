@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "nephele/levelset/grid/brick_box.h"
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/brick_samples.h"
+#include "nephele/levelset/grid/brick_table.h"
 
 namespace nephele::detail {
 
 namespace {
 
-constexpr int kBrick = BrickGrid::kBrick;
+constexpr int kBrick = kBrickSide;
 constexpr int kPlane = kBrick * kBrick;
 /// Planes of a brick in a block of points, and blocks in a brick.
 constexpr int kPlanes = kBlockSize / kPlane;
@@ -23,26 +24,29 @@ constexpr int kHalves = kBrick / kPlanes;
 }  // namespace
 
 struct BrickMemo::Table {
-  /// Values of one block.
-  struct Entry {
-    std::atomic<float*> values{nullptr};
-    Entry() = default;
-    Entry(const Entry&) = delete;
-    Entry& operator=(const Entry&) = delete;
-    ~Entry() { delete[] values.load(); }
-
-    void keep(const float* of) {
-      if (values.load(std::memory_order_relaxed)) return;
-      auto kept = std::make_unique_for_overwrite<float[]>(kBlockSize);
-      std::copy_n(of, kBlockSize, kept.get());
-      float* none = nullptr;
-      if (values.compare_exchange_strong(none, kept.get(), std::memory_order_acq_rel)) kept.release();
-    }
-  };
+  /// Where the values of a block are kept: kUnknown, kTaken while a thread writes them, else kFirst and on.
+  using Entry = std::atomic<std::uint32_t>;
+  static constexpr std::uint32_t kUnknown = 0, kTaken = 1, kFirst = 2;
 
   float voxelSize = 0.0f;
   BrickBox bricks;
   std::vector<Entry> entries;
+  /// Room for the values of all blocks, so that evaluation never allocates; pages come as they are written.
+  SampleStore values;
+  std::atomic<std::uint32_t> kept = 0;
+
+  /// The values of a block, or null.
+  const float* known(const Entry* entry) const {
+    const std::uint32_t at = entry ? entry->load(std::memory_order_acquire) : kUnknown;
+    return at < kFirst ? nullptr : values.data() + std::size_t(at - kFirst) * kBlockSize;
+  }
+  void keep(Entry* entry, const float* of) {
+    std::uint32_t unknown = kUnknown;
+    if (!entry || !entry->compare_exchange_strong(unknown, kTaken, std::memory_order_relaxed)) return;
+    const std::uint32_t at = kept.fetch_add(1, std::memory_order_relaxed);
+    std::copy_n(of, kBlockSize, values.data() + std::size_t(at) * kBlockSize);
+    entry->store(kFirst + at, std::memory_order_release);
+  }
 
   /// The entry of a block of points; null if they are no half of a brick.
   Entry* entryOf(const PointBlock& points) {
@@ -76,17 +80,17 @@ class MemoNode final : public FieldNode<float> {
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
     auto* entry = table_->entryOf(points);
-    if (const float* known = entry ? entry->values.load(std::memory_order_acquire) : nullptr) {
+    if (const float* known = table_->known(entry)) {
       std::copy_n(known, kBlockSize, values[0]);
       return;
     }
     field_->eval(points, values, scratch);
-    if (entry) entry->keep(values[0]);
+    table_->keep(entry, values[0]);
   }
   void evalGrad(const PointBlock& points, const BlockLanes<1>& values, const BlockLanes<3>& grads,
                 Scratch& scratch) const override {
     field_->evalGrad(points, values, grads, scratch);
-    if (auto* entry = table_->entryOf(points)) entry->keep(values[0]);
+    table_->keep(table_->entryOf(points), values[0]);
   }
   Interval range(const Box& box, RangeMemo& memo) const override { return memo.of(field_, box); }
   NodePtr<float> restricted(Restriction& restriction) const override {
@@ -116,12 +120,17 @@ BrickMemo::BrickMemo(const ScalarField& field, float voxelSize, const Box& box, 
     table_->bricks.first[axis] = int(low);
     table_->bricks.count[axis] = int(high - low) + 1;
   }
-  if (bricks <= mostBricks) table_->entries = std::vector<Table::Entry>(std::size_t(bricks) * kHalves);
+  if (bricks <= std::min(mostBricks, kMostBricks / kHalves)) {
+    const std::size_t blocks = std::size_t(bricks) * kHalves;
+    table_->values = SampleStore(blocks * kBlockSize);
+    table_->entries = std::vector<Table::Entry>(blocks);
+  }
   field_ = ScalarField(std::make_shared<MemoNode<Table>>(field.node(), table_));
 }
 
 void BrickMemo::clear() {
   std::vector<Table::Entry>().swap(table_->entries);
+  table_->values = {};
 }
 
 }  // namespace nephele::detail

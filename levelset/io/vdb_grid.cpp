@@ -20,6 +20,7 @@
 #include <limits>
 #include <span>
 
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_assembly.h"
@@ -31,7 +32,6 @@ namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kWidth = BrickGrid::kWidth;
-constexpr std::size_t kLargestTable = std::size_t(1) << 28;
 
 using FloatTree = openvdb::FloatTree;
 
@@ -54,12 +54,9 @@ class TreeTable {
     if (empty()) return;
     first_ -= Vec3i{1, 1, 1};
     last_ += Vec3i{1, 1, 1};
-    const double size = double(last_.x - first_.x + 1) * (last_.y - first_.y + 1) * (last_.z - first_.z + 1);
-    require(
-        size <= double(kLargestTable),
-        fmt::format("grid {} is spread over {} x {} x {} voxels, more than can be held in memory; crop it",
-                    name, 8.0 * count().x, 8.0 * count().y, 8.0 * count().z));
-    codes_.assign(std::size_t(size), 0);
+    requireHoldable("grid " + name, double(last_.x) - first_.x + 1, double(last_.y) - first_.y + 1,
+                    double(last_.z) - first_.z + 1);
+    codes_.assign(BrickBox{first(), count()}.size(), 0);
     fill(tree);
   }
 
@@ -469,6 +466,7 @@ openvdb::GridClass fileClass(VdbGridInfo::Class gridClass) {
 }  // namespace
 
 VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label) {
+  require(!bricks.isPacked(), "toVdb: the grid must not be packed");
   detail::initializeOpenVdb();
   const FileValues fileValues = fileValuesOf(bricks, label);
   auto grid = openvdb::FloatGrid::create(fileValues.background);

@@ -22,6 +22,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/detail/vdb_assembly.h"
 #include "nephele/levelset/mesh/triangle_kernels.h"
@@ -112,11 +113,9 @@ class BrickLists {
     high *= perVoxel_;
     constexpr double kLargestIndex = 1e9;
     const Vec3d size = (high - low) * (1.0 / kBrick) + Vec3d(1, 1, 1) * (band_ / 4 + 4);
-    require(
-        std::max({-low.x, -low.y, -low.z, high.x, high.y, high.z}) + band_ < kLargestIndex &&
-            size.x * size.y * size.z < double(std::size_t(1) << 31),
-        fmt::format("level set: {:.0f} x {:.0f} x {:.0f} voxels are more than can be held; use larger voxels",
-                    high.x - low.x, high.y - low.y, high.z - low.z));
+    requireHoldable("level set", size.x, size.y, size.z);
+    require(std::max({-low.x, -low.y, -low.z, high.x, high.y, high.z}) + band_ < kLargestIndex,
+            "level set: the mesh lies too far from the origin for voxels of this size; use larger voxels");
     for (int i = 0; i < 3; ++i) {
       // One brick more on every side: rows start outside.
       bricks_.first[i] = brickBelow(low[i] - band_) - 1;

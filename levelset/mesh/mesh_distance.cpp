@@ -35,8 +35,10 @@ namespace nephele {
 namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
-/// Each level doubles the voxel: no band needs more.
+/// Each level doubles the voxel: no band that is allowed needs more.
 constexpr std::size_t kMostLevels = 32;
+/// Of a band, voxels: the coarsest level then has some 10^4 bricks, each farther one twice as many.
+constexpr double kWidestBand = 1e6;
 
 /// Distance in fine voxels where level `index` takes over from the one before.
 double startOf(int index) {
@@ -496,7 +498,16 @@ ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options, c
   for (const Vec3d& p : mesh.positions)
     require(isFinite(p), "mesh distance: the mesh has positions that are not finite");
 
-  const double exterior = options.exteriorBand / h, interior = options.interiorBand / h;
+  // Nothing lies deeper inside a mesh than its box is wide.
+  Vec3d low = mesh.positions.front(), high = low;
+  for (const Vec3d& p : mesh.positions) low = min(low, p), high = max(high, p);
+  const double exterior = options.exteriorBand / h;
+  const double interior = std::min(options.interiorBand, length(high - low)) / h;
+  require(
+      exterior <= kWidestBand && interior <= kWidestBand,
+      fmt::format("mesh distance: the bands may be {:g} voxels wide, got {:g} outside and {:g} inside; use "
+                  "larger voxels",
+                  kWidestBand, exterior, interior));
   auto levels = std::make_shared<Levels>();
   levels->exteriorBand = float(options.exteriorBand);
   levels->interiorBand = float(options.interiorBand);

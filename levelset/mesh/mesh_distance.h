@@ -9,7 +9,8 @@ namespace nephele {
 struct MeshDistanceOptions {
   /// Finest voxel, world units: used within a few voxels of the surface.
   double voxelSize = 0.0;
-  /// World units outside (inside) the surface up to which the distance must hold.
+  /// World units outside (inside) the surface up to which the distance must hold, at most 10^6 voxels.
+  /// Inside, no more than the width of the mesh is used.
   double exteriorBand = 0.0;
   double interiorBand = 0.0;
 };
@@ -19,6 +20,8 @@ struct MeshDistanceOptions {
 /// Fine bricks near the surface and coarser levels behind them, each twice the voxel size of the one before,
 /// within 0.05 fine voxels of the exact distance away from the medial axis. Beyond the bands: the constant at
 /// its edge. Memory follows the surface, not the width of the band.
+/// @throws Error for an empty mesh, polygons or positions that are not finite, voxels that are not > 0, bands
+/// that are not > 0 or too wide; Cancelled.
 ScalarField meshDistance(const Mesh& mesh, const MeshDistanceOptions& options,
                          const Progress& progress = silent());
 

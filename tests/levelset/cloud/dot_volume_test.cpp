@@ -265,6 +265,44 @@ TEST(DotVolume, FarApartDotsCostTheTableBetweenThemOnly) {
   EXPECT_LE(volume.brickCount(), 8u);
 }
 
+TEST(DotVolume, LandsInTheRightVoxelFarFromTheOrigin) {
+  // At 1e5 single precision resolves 2^-7. In voxels of 0.01 these are 0.78 voxels apart, and the place of
+  // each, computed here in double precision, tells the two voxels along x that share it; the other axes are
+  // at 0.
+  constexpr float kVoxel = 0.01f;
+  for (int i = 0; i < 40; ++i) {
+    const Vec3f p{1e5f + float(i) / 128, 0, 0};
+    DotVolume volume({.voxelSize = kVoxel});
+    volume.add({.positions = {&p, 1}});
+    const double q = double(p.x) / double(kVoxel), share = q - std::floor(q);
+    const int voxel = int(std::floor(q));
+    const double all = 1 / (double(kVoxel) * double(kVoxel) * double(kVoxel));
+    EXPECT_NEAR(double(volume.density({voxel, 0, 0})) / all, 1 - share, 1e-5) << i;
+    EXPECT_NEAR(double(volume.density({voxel + 1, 0, 0})) / all, share, 1e-5) << i;
+  }
+}
+
+TEST(DotVolume, SmearsEvenlyFarFromTheOrigin) {
+  // A smear of 2 units over whole voxels of 1/128: every voxel between its ends has the same share of the
+  // mass.
+  constexpr float kVoxel = 1.0f / 128;
+  const Vec3f p{1e5f, 0, 0}, v{2, 0, 0};
+  DotVolume volume({.voxelSize = kVoxel, .shutterClose = 1});
+  volume.add({.positions = {&p, 1}, .velocities = {&v, 1}});
+  const double each = 1.0 / 256 * std::pow(128.0, 3);
+  for (int i = 1; i < 256; ++i)
+    EXPECT_NEAR(double(volume.density({12800000 + i, 0, 0})) / each, 1.0, 1e-4) << i;
+}
+
+TEST(DotVolume, CostsLittleForTheRoomBetweenDots) {
+  // Two dots at the ends of 10^8 bricks.
+  DotVolume volume({.voxelSize = 1});
+  const Vec3f p[2] = {{0, 0, 0}, {3600, 3600, 3600}};
+  volume.add({.positions = p});
+  EXPECT_LE(volume.brickCount(), 2u);
+  EXPECT_LT(volume.memoryBytes(), std::size_t(4) << 20);
+}
+
 TEST(DotVolume, RefusesWhatIsNoDot) {
   const auto said = [](const auto& body) {
     try {

@@ -116,6 +116,12 @@ TEST(MarchingTetrahedra, StandWhereTheMapOfTheGridPutsThem) {
   EXPECT_NEAR(length(Vec3d(boundingBox(mapped).center()) - Vec3d{10, 20, 30}), 0, 1e-4);
 }
 
+TEST(MarchingTetrahedra, RefuseAPackedGrid) {
+  const auto grid = ball(8);
+  pack(*grid);
+  EXPECT_THROW(marchingTetrahedra(*grid), Error);
+}
+
 TEST(MarchingTetrahedra, RefuseWhatHasNoSurface) {
   EXPECT_THROW(marchingTetrahedra(*denseGrid(
                    {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return 1; }, {}, 1.0f)),

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/brick_grids.h"
 
@@ -95,6 +96,15 @@ TEST(BrickGrid, PackingKeepsSamplesWithinHalfACode) {
         ASSERT_NEAR(packed.at({x, y, z}), grid->at({x, y, z}), (range.max - range.min) / 131070.0f + 1e-6f);
       }
   EXPECT_EQ(packed.at({100, 0, 0}), 7.0f);
+}
+
+TEST(BrickGrid, PackedGridsAreRefusedWhereSamplesAreReadOrWritten) {
+  // They hold no samples: writing them would be out of bounds.
+  auto grid = denseGrid({0, 0, 0}, {2, 1, 1}, scatter);
+  pack(*grid);
+  EXPECT_THROW(fillBorders(*grid), Error);
+  EXPECT_THROW(activeVoxelCount(*grid, {-1, 1}), Error);
+  EXPECT_THROW(toVdb(*grid, {"density"}), Error);
 }
 
 TEST(BrickGrid, PackingKeepsConstantsExactlyAndRefusesWhatIsNotFinite) {

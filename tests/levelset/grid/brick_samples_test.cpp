@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <limits>
 
@@ -12,6 +13,7 @@
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
+#include "tests/support/allocation_count.h"
 
 namespace nephele {
 namespace {
@@ -112,6 +114,26 @@ TEST(BrickMemo, EvaluatesTheSamplesOfBricksOnce) {
   memo.clear();
   EXPECT_EQ(bakeGrid(memo.field(), kBallOptions)->values, first->values);
   EXPECT_EQ(counted->count, 2 * once);
+}
+
+TEST(BrickMemo, NeverAllocatesWhileItIsEvaluated) {
+  constexpr float kVoxel = 0.05f;
+  const detail::BrickMemo memo(sphere({}, 0.5f), kVoxel, kBox, 1e6);
+  std::array<float, kBlockSize> x, y, z, values;
+  const auto evaluate = [&](int brick) {
+    for (int i = 0; i < kBlockSize; ++i) {
+      const Vec3f p = Vec3f(Vec3i{8 * brick + i % 8, i / 8 % 8, i / 64}) * kVoxel;
+      x[std::size_t(i)] = p.x, y[std::size_t(i)] = p.y, z[std::size_t(i)] = p.z;
+    }
+    memo.field().eval({x, y, z}, values);
+  };
+  // Once, for the scratch memory of this thread.
+  evaluate(0);
+  const long before = test::allocationCount();
+  for (const int brick : {1, 2, -1, 1}) evaluate(brick);
+  EXPECT_EQ(test::allocationCount(), before);
+  // Kept, and right: on the x axis the distance is 0.5 - |x|.
+  EXPECT_FLOAT_EQ(values[3], 0.5f - 11 * kVoxel);
 }
 
 TEST(BrickMemo, RemembersNothingOnALatticeThatIsTooLarge) {

@@ -211,6 +211,21 @@ TEST(MeshDistance, RefusesWrongArguments) {
   EXPECT_THROW(meshDistance(Mesh{}, {.voxelSize = 0.1, .exteriorBand = 1, .interiorBand = 1}), Error);
 }
 
+TEST(MeshDistance, RefusesABandThatNoGridCanHold) {
+  const Mesh mesh = icosphere(1.0, 1);
+  for (const double width : {1e6, 1e12, 1e300})
+    EXPECT_THROW(meshDistance(mesh, {.voxelSize = 0.1, .exteriorBand = width, .interiorBand = 1}), Error);
+}
+
+TEST(MeshDistance, UsesNoMoreOfABandThanThereIsInsideTheMesh) {
+  // The inscribed sphere of this icosphere has a radius of 1 to within 0.002; coarse levels round its ridge,
+  // the centre, over a voxel of theirs: 8 fine ones at this depth of 50.
+  const ScalarField distance =
+      meshDistance(icosphere(1.0, 4), {.voxelSize = 0.02, .exteriorBand = 0.1, .interiorBand = 1e300});
+  EXPECT_NEAR(distance({0.5f, 0, 0}), 0.5f, 0.005f);
+  EXPECT_NEAR(distance({0, 0, 0}), 1.0f, 0.16f);
+}
+
 /// Nearest point by trying a fine sampling of barycentrics refined by projection: double precision, all
 /// triangles.
 double bruteForceDistance(const Mesh& mesh, const Vec3d& p) {

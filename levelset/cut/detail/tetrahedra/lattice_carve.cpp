@@ -38,6 +38,7 @@ class LatticeCarver {
       : carving_{.level = level, .knives = knives, .halfKerf = double(kerf) / 2}, progress_(progress) {
     require(knives.size() * carving_.functionsPerKnife() < kMostFunctions,
             fmt::format("cut: too many knives for a level set: {}", knives.size()));
+    require(!level.isPacked(), "cut: the level set must not be packed");
     require(level.background <= 0, "cut: the level set does not end: its background is inside");
     for (unsigned corner = 1; corner < 8; ++corner)
       carving_.longestEdge = std::max(
