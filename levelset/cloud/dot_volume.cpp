@@ -20,6 +20,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <numbers>
@@ -145,15 +146,13 @@ struct BrickSpan {
 
 /// Without a call of std::floor, which needs instructions that not every machine has.
 template <class Real>
-int floorOf(Real x) {
-  const int whole = int(x);
-  return whole - int(x < Real(whole));
+Vec3i floorOf(const Vec3<Real>& q) {
+  const auto along = [](Real x) {
+    const int whole = int(x);
+    return whole - int(x < Real(whole));
+  };
+  return {along(q.x), along(q.y), along(q.z)};
 }
-template <class Vector>
-Vec3i floorOf(const Vector& q) requires requires {
-  q.x;
-}
-{ return {floorOf(q.x), floorOf(q.y), floorOf(q.z)}; }
 
 BrickSpan bricksOf(const Vec3d& q, int reach) {
   const Vec3i low = floorOf(q), r{reach, reach, reach};
@@ -191,8 +190,8 @@ struct DotVolume::Impl {
   std::vector<std::uint32_t> counters;  ///< Per place of the bricks' table: all 0 between batches.
 
   // Working memory of a batch.
-  std::vector<std::size_t> firstSplat;  ///< Of each dot, and after the last.
-  std::vector<std::uint32_t> dotOfSplat;
+  std::vector<std::size_t> firstSplat;    ///< Of each dot, and after the last.
+  std::vector<std::uint32_t> dotOfSplat;  ///< Where dots are smeared; else each is one splat.
   std::size_t splatCount = 0;
   std::vector<Splat> entries;
 
@@ -260,7 +259,13 @@ struct DotVolume::Impl {
   /// begins.
   template <class Visit>
   void forEntries(const DotSpans& dots, std::size_t begin, std::size_t end, const Visit& visit) const {
+    const bool smeared = smears(dots);
     for (std::size_t s = begin; s < end; ++s) {
+      if (!smeared) {
+        const Vec3d q = Vec3d(dots.positions[s]) * perIndex;
+        bricksOf(q, reach(dots, s)).forEach([&](const Vec3i& brick) { visit(brick, q, s, s, 1); });
+        continue;
+      }
       const std::size_t dot = dotOfSplat[s];
       const Way way = wayOf(dots, dot);
       const Run run = runOf(s, dot, way);
@@ -274,7 +279,6 @@ struct DotVolume::Impl {
   void requireSound(const DotSpans& dots) const;
   void addBatch(const DotSpans& dots, const Progress& progress);
   void makeSplats(const DotSpans& dots);
-  void makePlaces(const DotSpans& dots);
   std::vector<std::size_t> countEntries(const DotSpans& dots);
   template <bool hasColor>
   void sumBrick(const DotSpans& dots, std::size_t place, Splat* first, Splat* last) const;
@@ -317,6 +321,7 @@ void DotVolume::Impl::requireSound(const DotSpans& dots) const {
 
 void DotVolume::Impl::makeSplats(const DotSpans& dots) {
   splatCount = firstSplat.back();
+  if (!smears(dots)) return;
   makeRoom(dotOfSplat, splatCount);
   parallelFor(dots.size(), kPiece, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
@@ -325,45 +330,58 @@ void DotVolume::Impl::makeSplats(const DotSpans& dots) {
   });
 }
 
-/// Makes places for all bricks that splats touch.
-void DotVolume::Impl::makePlaces(const DotSpans& dots) {
-  const detail::BrickTable& table = bricks.table();
-  const std::size_t pieces = (splatCount + kPiece - 1) / kPiece;
-  std::vector<std::vector<Vec3i>> missing(pieces);
-  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
-    std::vector<Vec3i>& found = missing[piece];
-    forEntries(dots, piece * kPiece, std::min((piece + 1) * kPiece, splatCount),
-               [&](const Vec3i& b, auto&&...) {
-                 // One brick stands for all of its cube.
-                 const Vec3i cube{b.x & ~7, b.y & ~7, b.z & ~7};
-                 if (!table.includes(b) && (found.empty() || found.back() != cube)) found.push_back(cube);
-               });
-    std::sort(found.begin(), found.end(), comesBefore);
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-  });
-  for (const std::vector<Vec3i>& found : missing)
-    for (const Vec3i& brick : found) bricks.table().include(brick);
-  counters.resize(table.placeCount(), 0);
-}
-
-/// Counts the entries of every brick and returns the bricks that have some, in the order of the table.
+/// Counts the entries of every brick and returns the places of bricks that have some, in order.
 std::vector<std::size_t> DotVolume::Impl::countEntries(const DotSpans& dots) {
+  detail::BrickTable& table = bricks.table();
   const std::size_t pieces = (splatCount + kPiece - 1) / kPiece;
   std::vector<std::vector<std::size_t>> found(pieces);
+  const auto count = [&](std::size_t place, std::size_t piece) {
+    if (std::atomic_ref(counters[place]).fetch_add(1, std::memory_order_relaxed) == 0)
+      found[piece].push_back(place);
+  };
+  // Bricks without a place get theirs together with their cube, and are counted afterwards.
+  struct Missing {
+    std::vector<std::size_t> splats;
+    std::vector<Vec3i> cubes;
+    /// Keeps most cubes from being noted more than once; begins with what is no cube's first brick.
+    std::array<Vec3i, 256> noted;
+    Missing() { noted.fill({1, 1, 1}); }
+
+    void note(const Vec3i& brick) {
+      const Vec3i cube{brick.x & ~7, brick.y & ~7, brick.z & ~7};
+      Vec3i& last = noted[std::size_t((cube.x >> 3) + 7 * (cube.y >> 3) + 53 * (cube.z >> 3)) % noted.size()];
+      if (last == cube) return;
+      cubes.push_back(last = cube);
+    }
+  };
+  std::vector<Missing> missing(pieces);
   parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
-    forEntries(dots, piece * kPiece, std::min((piece + 1) * kPiece, splatCount),
-               [&](const Vec3i& b, auto&&...) {
-                 const std::size_t place = bricks.table().placeOf(b);
-                 if (std::atomic_ref(counters[place]).fetch_add(1, std::memory_order_relaxed) == 0)
-                   found[piece].push_back(place);
+    const std::size_t end = std::min((piece + 1) * kPiece, splatCount);
+    std::vector<std::size_t>& later = missing[piece].splats;
+    forEntries(dots, piece * kPiece, end,
+               [&](const Vec3i& brick, const Vec3d&, std::size_t splat, auto&&...) {
+                 const std::size_t place = table.placeOf(brick);
+                 if (place >= detail::BrickTable::kPlaces) return count(place, piece);
+                 missing[piece].note(brick);
+                 if (later.empty() || later.back() != splat) later.push_back(splat);
                });
   });
+  const std::size_t places = table.placeCount();
+  for (const Missing& some : missing)
+    for (const Vec3i& brick : some.cubes) table.include(brick);
+  counters.resize(table.placeCount(), 0);
+  parallelFor(pieces, 1, [&](std::size_t piece, std::size_t) {
+    for (const std::size_t splat : missing[piece].splats)
+      forEntries(dots, splat, splat + 1, [&](const Vec3i& brick, auto&&...) {
+        if (const std::size_t place = table.placeOf(brick); place >= places) count(place, piece);
+      });
+  });
   std::vector<std::size_t> touched;
-  std::size_t count = 0;
-  for (const auto& part : found) count += part.size();
-  touched.reserve(count);
+  std::size_t sum = 0;
+  for (const auto& part : found) sum += part.size();
+  touched.reserve(sum);
   // Sorting beats a walk over the table where little of it is touched.
-  if (count < counters.size() / 16) {
+  if (sum < counters.size() / 16) {
     for (const auto& part : found) touched.insert(touched.end(), part.begin(), part.end());
     std::sort(touched.begin(), touched.end());
   } else {
@@ -409,7 +427,6 @@ void DotVolume::Impl::sumBrick(const DotSpans& dots, std::size_t place, Splat* f
 
 void DotVolume::Impl::addBatch(const DotSpans& dots, const Progress& progress) {
   makeSplats(dots);
-  makePlaces(dots);
   const std::vector<std::size_t> touched = countEntries(dots);
   const std::size_t oldBricks = bricks.count();
   detail::BrickTable& table = bricks.table();

@@ -40,11 +40,7 @@ class BrickTable {
   explicit BrickTable(std::string maker) : maker_(std::move(maker)), numbers_(kPlaces, kNone) {}
 
   /// The number of `brick`, or kNone.
-  std::int32_t at(const Vec3i& brick) const {
-    const Vec3i cube = cubeOf(brick);
-    return cubes_.covers(cube) ? numbers_[directory_[cubes_.numberOf(cube)] * kPlaces + insideCube(brick)]
-                               : kNone;
-  }
+  std::int32_t at(const Vec3i& brick) const { return numbers_[placeOf(brick)]; }
   /// @throws Error if the box of all bricks becomes too large to hold.
   void set(const Vec3i& brick, std::int32_t number) {
     include(brick);
@@ -56,13 +52,11 @@ class BrickTable {
 
   /// Makes places for a brick and those of its cube. @throws Error as above.
   void include(const Vec3i& brick);
-  bool includes(const Vec3i& brick) const {
-    const Vec3i cube = cubeOf(brick);
-    return cubes_.covers(cube) && directory_[cubes_.numberOf(cube)] != 0;
-  }
-  /// Places are numbered from 0 as they are made, for values beside the numbers. Of a brick that has one.
+  /// The place of a brick, for values beside the numbers; less than kPlaces where it has none. Places are
+  /// numbered as they are made, and stay.
   std::size_t placeOf(const Vec3i& brick) const {
-    return directory_[cubes_.numberOf(cubeOf(brick))] * kPlaces + insideCube(brick);
+    const Vec3i cube = cubeOf(brick);
+    return (cubes_.covers(cube) ? directory_[cubes_.numberOf(cube)] * kPlaces : 0) + insideCube(brick);
   }
   std::size_t placeCount() const { return numbers_.size(); }
   /// The number at a place.

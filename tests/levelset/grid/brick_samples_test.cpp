@@ -125,7 +125,7 @@ TEST(BrickMemo, NeverAllocatesWhileItIsEvaluated) {
       const Vec3f p = Vec3f(Vec3i{8 * brick + i % 8, i / 8 % 8, i / 64}) * kVoxel;
       x[std::size_t(i)] = p.x, y[std::size_t(i)] = p.y, z[std::size_t(i)] = p.z;
     }
-    memo.field().eval({x, y, z}, values);
+    memo.field().eval({x, y, z}, std::span<float>(values));
   };
   // Once, for the scratch memory of this thread.
   evaluate(0);
