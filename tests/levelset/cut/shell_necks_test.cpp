@@ -29,7 +29,7 @@ struct Balls {
     const auto nearest = [spacing](float x, int count) {
       return spacing * std::clamp(std::round(x / spacing), 0.0f, float(count - 1));
     };
-    const ScalarField shape = functionField<float>([=](const Vec3f& p) {
+    const ScalarField shape = functionField([=](const Vec3f& p) {
       return 4 - length(p - Vec3f{nearest(p.x, kAlongX), nearest(p.y, kAlongY), 0});
     });
     box = {{-5, -5, -5}, {spacing * (kAlongX - 1) + 5, spacing * (kAlongY - 1) + 5, 5}};
@@ -69,7 +69,7 @@ TEST(ShellNecks, JoinWhatIsOneAlsoAmongManyShells) {
   // Plates half a voxel thick that rise by a voxel in 20: samples see each of them as some five stripes. A
   // plate is convex, so that every line between two of its samples stays inside: one piece each.
   constexpr int kPlates = 12;
-  const ScalarField shape = functionField<float>([](const Vec3f& p) {
+  const ScalarField shape = functionField([](const Vec3f& p) {
     const float row = 16 * std::clamp(std::round(p.y / 16), 0.0f, float(kPlates - 1));
     return std::min({0.25f - std::abs(p.z - p.x / 20), 4.3f - std::abs(p.y - row), 50 - std::abs(p.x - 50)});
   });

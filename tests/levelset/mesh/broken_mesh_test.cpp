@@ -6,7 +6,7 @@
 
 #include "nephele/levelset/cloud/attribute_field.h"
 #include "nephele/levelset/cloud/cloud.h"
-#include "nephele/levelset/cut/mesh_pieces.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/exact_distance.h"
 #include "nephele/levelset/mesh/mass_properties.h"
@@ -86,11 +86,11 @@ INSTANTIATE_TEST_SUITE_P(
               [](const Mesh& m) {
                 facingField(m, {0, 1, 0});
               }},
-        Entry{"cutMesh",
+        Entry{"cutIntoMeshes",
               [](const Mesh& m) {
-                cutMesh(m, {.planes = {{{}, {1, 0, 0}}}});
+                cutIntoMeshes(m, {.planes = {{{}, {1, 0, 0}}}});
               }},
-        Entry{"cutMesh_solid", [](const Mesh& m) { cutMesh(whole(), {.solids = {m}}); }},
+        Entry{"cutIntoMeshes_solid", [](const Mesh& m) { cutIntoMeshes(whole(), {.solids = {m}}); }},
         Entry{"warpMesh", [](const Mesh& m) { warpMesh(m, whole()); }},
         Entry{"warpMesh_object", [](const Mesh& m) { warpMesh(whole(), m); }},
         Entry{"transferAttributes", [](const Mesh& m) { transferAttributes(m, whole(), whole().positions); }},
