@@ -11,6 +11,8 @@ namespace nephele {
 
 Pieces cutIntoMeshes(const Mesh& mesh, const Knives& knives, const CutOptions& options,
                      const Progress& progress) {
+  requireValid(mesh);
+  for (const Mesh& solid : knives.solids) requireValid(solid);
   detail::requireKnives(knives, options);
   require(knives.fields.empty(),
           "cut: fields cut level sets only; a mesh is cut by planes, cells, rough blades "
