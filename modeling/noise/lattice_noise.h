@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "nephele/modeling/noise/detail/noise_kernels.h"
+#include "nephele/modeling/noise/perlin_lattice.h"
 
 /// Noises of a lattice on lanes of points. See noise.h for what they compute.
 namespace nephele::detail {

@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "nephele/modeling/noise/detail/noise_kernels.h"
 #include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/noise/perlin_lattice.h"
 
 /// What noises draw from their seeds. For the implementation of noises.
 namespace nephele::detail {
