@@ -81,11 +81,10 @@ class Ladder {
     result_.after = result_.repairs.empty() && result_.before.mergedVertices == 0 && source_.isTriangles()
                         ? result_.before
                         : diagnose(result_.mesh);
-    require(
-        result_.after.closed() && result_.after.volume > 0,
-        fmt::format(
-            "mesh repair: the mesh could not be closed ({}); --repair wrap makes a closed surface around it",
-            joined(result_.after.problems())));
+    require(result_.after.closed() && result_.after.volume > 0,
+            fmt::format("mesh repair: the mesh could not be closed ({}); repair mode 'wrap' makes a closed "
+                        "surface around it",
+                        joined(result_.after.problems())));
     if (isThin(result_.after)) failThin(result_.after);
     return std::move(result_);
   }
@@ -95,15 +94,17 @@ class Ladder {
     throw Error(
         fmt::format("mesh repair: the mesh is flat: it encloses {:.3g} cubic units within an area of {:.3g}, "
                     "too thin for any grid; "
-                    "--repair wrap makes a shell around it",
+                    "repair mode 'wrap' makes a shell around it",
                     d.volume, d.area));
   }
 
   void requireGood() {
     const MeshDiagnosis& d = result_.before;
-    require(d.closed(), fmt::format("mesh repair: the mesh is not closed: {}; --repair auto would repair it",
-                                    joined(d.problems())));
-    require(!d.inward(), "mesh repair: the mesh is closed but oriented inwards; --repair auto would turn it");
+    require(d.closed(),
+            fmt::format("mesh repair: the mesh is not closed: {}; repair mode 'auto' would repair it",
+                        joined(d.problems())));
+    require(!d.inward(),
+            "mesh repair: the mesh is closed but oriented inwards; repair mode 'auto' would turn it");
   }
 
   void report(std::string what) { result_.repairs.push_back(std::move(what)); }
@@ -134,10 +135,11 @@ class Ladder {
   }
 
   void requireFaces() const {
-    require(result_.mesh.faceCount() > 0,
-            "mesh repair: nothing is left without degenerate and coincident faces; --repair wrap makes a "
-            "shell around "
-            "what was there");
+    require(
+        result_.mesh.faceCount() > 0,
+        "mesh repair: nothing is left without degenerate and coincident faces; repair mode 'wrap' makes a "
+        "shell around "
+        "what was there");
   }
 
   void dropDegenerates() {
@@ -201,7 +203,8 @@ class Ladder {
     const SheetShare sheets = sheetShare(filled, parts);
     if (sheets.area > 0.5 * sheets.total) {
       throw Error(fmt::format(
-          "mesh repair: the mesh is {}, not a solid ({}), so it has no inside; --repair wrap makes a shell "
+          "mesh repair: the mesh is {}, not a solid ({}), so it has no inside; repair mode 'wrap' makes a "
+          "shell "
           "around it",
           oneSided_ > 0 ? "a one-sided sheet" : "an open sheet", joined(result_.before.problems())));
     }

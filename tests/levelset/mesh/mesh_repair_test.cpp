@@ -153,7 +153,7 @@ TEST(MeshRepair, HoleIsFilledWithTheMissingFace) {
 TEST(MeshRepair, ModeOffRefusesAnOpenMeshWithItsDefectsAndTheOption) {
   const std::string message = messageFor(withoutFace(cube(), 3), Mode::off);
   EXPECT_NE(message.find("not closed: open: 4 boundary edges in 1 hole"), std::string::npos) << message;
-  EXPECT_NE(message.find("--repair auto"), std::string::npos) << message;
+  EXPECT_NE(message.find("repair mode 'auto'"), std::string::npos) << message;
   EXPECT_EQ(messageFor(cube(), Mode::off), "no error");
   EXPECT_NE(messageFor(cube(true), Mode::off).find("oriented inwards"), std::string::npos);
 }
@@ -226,7 +226,7 @@ TEST(MeshRepair, SheetsAreRefusedAndWrappedOnDemand) {
   sheet.addFace(std::array<std::uint32_t, 4>{0, 1, 2, 3});
   const std::string message = messageFor(sheet, Mode::automatic);
   EXPECT_NE(message.find("an open sheet, not a solid"), std::string::npos) << message;
-  EXPECT_NE(message.find("--repair wrap"), std::string::npos) << message;
+  EXPECT_NE(message.find("repair mode 'wrap'"), std::string::npos) << message;
 
   const RepairedMesh shell = repairMesh(sheet, {.mode = Mode::wrap, .wrapAlpha = 0.1, .wrapOffset = 0.02});
   EXPECT_TRUE(shell.after.manifold());
@@ -347,7 +347,7 @@ TEST_P(DefectiveFiles, AreRepairedAsListedOrRefusedWithTheReason) {
   if (outcome.refusal) {
     const std::string message = messageFor(mesh, Mode::automatic);
     EXPECT_NE(message.find(outcome.refusal), std::string::npos) << message;
-    EXPECT_NE(message.find("--repair wrap"), std::string::npos) << message;
+    EXPECT_NE(message.find("repair mode 'wrap'"), std::string::npos) << message;
     return;
   }
   const RepairedMesh repaired = repairMesh(mesh);
