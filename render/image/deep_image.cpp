@@ -1,6 +1,9 @@
 #include "nephele/render/image/deep_image.h"
 
+#include <Imath/half.h>
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "nephele/modeling/base/error.h"
 
@@ -16,6 +19,10 @@ void DeepImage::check() const {
   require(width > 0 && height > 0 && pixels.size() == std::size_t(width) * std::size_t(height),
           fmt::format("deep image: has {} lists of samples, but its size is {}x{}", pixels.size(), width,
                       height));
+}
+
+float roundedToHalf(float value) {
+  return float(half(std::clamp(value, -65504.0f, 65504.0f)));
 }
 
 FlatPixel flattened(const std::vector<DeepSample>& samples) {

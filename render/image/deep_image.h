@@ -32,6 +32,10 @@ struct DeepImage {
   void check() const;
 };
 
+/// The nearest number to `value` that 16 bit floats hold, at most 65504 either way: what files keep of alpha
+/// and colour.
+float roundedToHalf(float value);
+
 /// Front to back: what the samples of a pixel look like together; colour and, last, opacity.
 struct FlatPixel {
   Vec3f colour{};

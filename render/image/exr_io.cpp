@@ -11,6 +11,7 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
@@ -34,6 +35,12 @@ Imath::M44f matrix(const Mat44& m) {
   Imath::M44f result;
   for (int row = 0; row != 4; ++row)
     for (int column = 0; column != 4; ++column) result[row][column] = m[std::size_t(row * 4 + column)];
+  return result;
+}
+
+Mat44 numbers(const Imath::M44f& m) {
+  Mat44 result;
+  for (int i = 0; i != 16; ++i) result[std::size_t(i)] = m[i / 4][i % 4];
   return result;
 }
 
@@ -120,6 +127,18 @@ Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::
   Imf::addWorldToNDC(header, matrix(camera.worldToNdc));
   for (const auto& [name, value] : metadata) header.insert(name, Imf::StringAttribute(value));
   return header;
+}
+
+std::optional<ImageCamera> readImageCamera(const std::string& path) {
+  try {
+    const Imf::MultiPartInputFile file(path.c_str());
+    const Imf::Header& header = file.header(0);
+    if (!Imf::hasWorldToCamera(header) || !Imf::hasWorldToNDC(header)) return std::nullopt;
+    return ImageCamera{numbers(Imf::worldToCamera(header)), numbers(Imf::worldToNDC(header)),
+                       header.screenWindowWidth()};
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+  }
 }
 
 void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,

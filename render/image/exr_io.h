@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,10 @@ void writeExr(const std::string& path, const Image& image, const ImageCamera& ca
 /// Likewise into `output`, which the caller commits.
 void writeExr(const OutputFile& output, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata = {});
+
+/// What an OpenEXR file, flat or deep, says of the camera that saw it; nothing if it does not say all of it.
+/// @throws Error naming the path if it cannot be read.
+std::optional<ImageCamera> readImageCamera(const std::string& path);
 
 /// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1. The pixels
 /// are those of the data window, the display is set where it is another.

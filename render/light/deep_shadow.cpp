@@ -12,18 +12,16 @@
 // Limits: one picture, so the light must see the volume within a cone; structure finer than a pixel is lost.
 #include "nephele/render/light/deep_shadow.h"
 
-#include <Imath/half.h>
-#include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfMatrixAttribute.h>
-#include <OpenEXR/ImfMultiPartInputFile.h>
-#include <OpenEXR/ImfStandardAttributes.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
 
@@ -42,10 +40,8 @@ double densityAt(const BrickGrid& grid, const Vec3d& p) {
   const Vec3f f(p - floor);
   const float* at =
       grid.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
-  constexpr int row = BrickGrid::kWidth, plane = row * row;
-  const auto edge = [&](int offset) { return at[offset] + f.x * (at[offset + 1] - at[offset]); };
-  const auto face = [&](int offset) { return edge(offset) + f.y * (edge(offset + row) - edge(offset)); };
-  return double(std::max(face(0) + f.z * (face(plane) - face(0)), 0.0f));
+  constexpr int row = BrickGrid::kWidth;
+  return double(std::max(trilinear(at, f, row, row * row), 0.0f));
 }
 
 // One pixel's curve, simplified as it comes in.
@@ -91,7 +87,7 @@ class Curve {
     const int count = std::max(1, int(std::ceil(slope * way)));
     for (int i = 0; i != count; ++i) {
       const double depth = std::max((target - beginDepth_) / (count - i), 0.0);
-      const float alpha = float(half(float(-std::expm1(-depth))));
+      const float alpha = roundedToHalf(float(-std::expm1(-depth)));
       if (!(alpha > 0)) continue;
       samples_.push_back(
           {float(beginZ_ + way * i / count), float(beginZ_ + way * (i + 1) / count), alpha, {}});
@@ -247,9 +243,7 @@ void DeepShadowMap::make(const RenderVolume& volume, const Camera& camera, float
           }
       },
       progress);
-  camera_ = std::make_shared<const Camera>(camera);
-  worldToCamera_ = camera.worldToCamera();
-  worldToNdc_ = camera.worldToNdc();
+  camera_ = camera;
   curves_ = std::make_shared<const Holdout>(*image);
   image_ = std::move(image);
 }
@@ -257,26 +251,15 @@ void DeepShadowMap::make(const RenderVolume& volume, const Camera& camera, float
 DeepShadowMap DeepShadowMap::read(const std::string& path, double mostBytes) {
   DeepShadowMap map;
   map.curves_ = std::make_shared<const Holdout>(readDeepExr(path, mostBytes));
-  try {
-    const Imf::MultiPartInputFile file(path.c_str());
-    const Imf::Header& header = file.header(0);
-    require(Imf::hasWorldToCamera(header) && Imf::hasWorldToNDC(header),
-            path + ": does not say where the light stood (worldToCamera, worldToNDC)");
-    for (int i = 0; i != 16; ++i) {
-      map.worldToCamera_[std::size_t(i)] = Imf::worldToCamera(header)[i / 4][i % 4];
-      map.worldToNdc_[std::size_t(i)] = Imf::worldToNDC(header)[i / 4][i % 4];
-    }
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
-  }
+  const std::optional<ImageCamera> camera = readImageCamera(path);
+  require(camera.has_value(), path + ": does not say where the light stood (worldToCamera, worldToNDC)");
+  map.camera_ = *camera;
   return map;
 }
 
 void DeepShadowMap::write(const std::string& path, const std::map<std::string, std::string>& metadata) const {
-  require(image_ && camera_, path + ": a deep shadow map that was read is not written again");
-  writeDeepExr(path, *image_, *camera_, metadata);
+  require(image_ != nullptr, path + ": a deep shadow map that was read is not written again");
+  writeDeepExr(path, *image_, camera_, metadata);
 }
 
 float DeepShadowMap::depthAt(int x, int y, float depth) const {
@@ -294,7 +277,8 @@ float DeepShadowMap::depthAt(int x, int y, float depth) const {
 
 float DeepShadowMap::opticalDepth(const Vec3f& world) const {
   double w = 1, one = 1;
-  const Vec3d p(world), ndc = transformed(worldToNdc_, p, w), camera = transformed(worldToCamera_, p, one);
+  const Vec3d p(world), ndc = transformed(camera_.worldToNdc, p, w),
+                        camera = transformed(camera_.worldToCamera, p, one);
   if (!(camera.z > 0) || !(w > 0)) return 0.0f;
   const double x = ndc.x / w * curves_->width() - 0.5, y = ndc.y / w * curves_->height() - 0.5;
   if (!(x > -1 && y > -1 && x < curves_->width() && y < curves_->height())) return 0.0f;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "nephele/modeling/base/progress.h"
+#include "nephele/render/image/image_camera.h"
 #include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/holdout.h"
 #include "nephele/render/scene/lights.h"
@@ -50,9 +51,9 @@ class DeepShadowMap {
 
   /// What `write` writes; not there for maps that were read.
   std::shared_ptr<const DeepImage> image_;
-  std::shared_ptr<const Camera> camera_;
   std::shared_ptr<const Holdout> curves_;
-  Mat44 worldToCamera_{}, worldToNdc_{};
+  /// At the light.
+  ImageCamera camera_;
 };
 
 }  // namespace nephele

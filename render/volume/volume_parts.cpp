@@ -26,6 +26,7 @@
 #include <optional>
 #include <tuple>
 
+#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/scene/black_body.h"
@@ -125,7 +126,7 @@ class Combiner {
     double grids = 0;
     for (const bool used : channels_) grids += used;
     return grids * (double(reachedBricks().size() + 1) * BrickGrid::kVolume * sizeof(float) +
-                    double(count_.x) * count_.y * count_.z * sizeof(std::int32_t));
+                    double(box_.size()) * sizeof(std::int32_t));
   }
 
  private:
@@ -153,7 +154,7 @@ class Combiner {
   std::vector<BlackBodyColours> incandescence_;
   bool hasColour_ = false, hasEmission_ = false;
   bool channels_[kChannels] = {};
-  Vec3i first_{}, count_{};
+  BrickBox box_;
 };
 
 Vec3d Combiner::farthest(const VolumePart& part) const {
@@ -183,26 +184,18 @@ std::vector<Vec3i> Combiner::reachedBricks() {
       fmt::format("volumes: together they span {:g} x {:g} x {:g} voxels of the finest of them, more than "
                   "can be held; use fewer or larger voxels",
                   size.x * kBrick, size.y * kBrick, size.z * kBrick));
-  first_ = low;
-  count_ = high - low + Vec3i{1, 1, 1};
-  std::vector<std::uint8_t> reached(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z));
+  box_ = {low, high - low + Vec3i{1, 1, 1}};
+  std::vector<std::uint8_t> reached(box_.size());
   forEachCarrier([&](const detail::SourceGrid& source, const Vec3d& motion) {
     source.visitBricks(motion, [&](const Vec3i& first, const Vec3i& last) {
       for (int z = first.z; z <= last.z; ++z)
         for (int y = first.y; y <= last.y; ++y)
-          for (int x = first.x; x <= last.x; ++x) {
-            const Vec3i b = Vec3i{x, y, z} - low;
-            reached[(std::size_t(b.z) * std::size_t(count_.y) + std::size_t(b.y)) * std::size_t(count_.x) +
-                    std::size_t(b.x)] = 1;
-          }
+          for (int x = first.x; x <= last.x; ++x) reached[box_.numberOf({x, y, z})] = 1;
     });
   });
   std::vector<Vec3i> bricks;
-  std::size_t entry = 0;
-  for (int z = 0; z != count_.z; ++z)
-    for (int y = 0; y != count_.y; ++y)
-      for (int x = 0; x != count_.x; ++x)
-        if (reached[entry++]) bricks.push_back(low + Vec3i{x, y, z});
+  for (std::size_t i = 0; i != reached.size(); ++i)
+    if (reached[i]) bricks.push_back(box_.at(i));
   return bricks;
 }
 
@@ -282,12 +275,12 @@ RenderVolume Combiner::combined(const Progress& progress) {
     grids[c]->indexToWorld = lattice_.indexToWorld;
     grids[c]->worldToIndex = lattice_.worldToIndex;
     grids[c]->voxelSize = lattice_.voxelSize;
-    grids[c]->firstBrick = first_;
-    grids[c]->brickCount = count_;
+    grids[c]->firstBrick = box_.first;
+    grids[c]->brickCount = box_.count;
     grids[c]->values.assign(BrickGrid::kVolume, 0.0f);
     grids[c]->ranges.assign(1, Interval::of(0));
   }
-  std::vector<std::int32_t> table(std::size_t(count_.x) * std::size_t(count_.y) * std::size_t(count_.z), 0);
+  std::vector<std::int32_t> table(box_.size(), 0);
   std::map<std::array<float, kChannels>, std::int32_t> constants{{{}, 0}};
 
   constexpr std::size_t chunk = 2048, volume = BrickGrid::kVolume;
@@ -315,10 +308,7 @@ RenderVolume Combiner::combined(const Progress& progress) {
         isConstant = isConstant && ranges[c][i].isPoint();
         constant[c] = ranges[c][i].min;
       }
-      const Vec3i b = bricks[begin + i] - first_;
-      std::int32_t& entry =
-          table[(std::size_t(b.z) * std::size_t(count_.y) + std::size_t(b.y)) * std::size_t(count_.x) +
-                std::size_t(b.x)];
+      std::int32_t& entry = table[box_.numberOf(bricks[begin + i])];
       entry = std::int32_t(grids[0]->ranges.size());
       if (isConstant) {
         const auto [known, isNew] = constants.try_emplace(constant, entry);

@@ -12,18 +12,12 @@
 // fraction of the tolerance are left out.
 #include "nephele/render/march/detail/deep_pixel.h"
 
-#include <Imath/half.h>
-
 #include <algorithm>
 #include <cmath>
 
 namespace nephele::detail {
 
 namespace {
-
-float rounded(float value) {
-  return float(half(std::clamp(value, -65504.0f, 65504.0f)));
-}
 
 float most(const Vec3f& v) {
   return std::max({v.x, v.y, v.z});
@@ -171,9 +165,9 @@ std::vector<DeepSample> DeepPixel::samples() {
       if (left > 0) {
         const float scale = 1 / left;
         DeepSample sample{mean_[first].z, mean_[last].z,
-                          rounded(std::clamp((mean_[last].opacity - front.alpha) * scale, 0.0f, 1.0f))};
+                          roundedToHalf(std::clamp((mean_[last].opacity - front.alpha) * scale, 0.0f, 1.0f))};
         for (int c = 0; c != 3; ++c)
-          sample.colour[c] = rounded(std::max((mean_[last].colour[c] - front.colour[c]) * scale, 0.0f));
+          sample.colour[c] = roundedToHalf(std::max((mean_[last].colour[c] - front.colour[c]) * scale, 0.0f));
         if (sample.alpha > 0 || sample.colour != Vec3f{}) {
           result.push_back(sample);
           front.colour += sample.colour * left;
