@@ -19,9 +19,7 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
   if(NEPHELE_WITH_CGAL)
     find_package(CGAL REQUIRED)
   endif()
-  if(NEPHELE_WITH_EMBREE)
-    find_package(embree 3 REQUIRED)
-  endif()
+  find_package(embree 3 REQUIRED)
 
   # Debian's OpenVDB installs its find module, but not on CMake's path.
   list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)

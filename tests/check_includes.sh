@@ -27,9 +27,28 @@ render/march      modeling levelset render/image render/scene render/volume rend
 render/preview    modeling levelset render/image render/scene render/volume render/light render/march
 '
 
+# What still breaks the order, to be mended and not to be added to: these know OpenVDB's form of a grid, whose place is
+# levelset/io, and would have to work on bricks.
+known='
+levelset/flow/advection_files.cpp
+levelset/mesh/marching_cubes.h
+levelset/mesh/mesh_to_level_set.h
+levelset/mesh/mesh_to_level_set.cpp
+levelset/mesh/mesh_band.h
+levelset/mesh/mesh_band.cpp
+levelset/mesh/adaptive_mesh.h
+levelset/mesh/adaptive_mesh.cpp
+levelset/cloud/renormalise.cpp
+levelset/cloud/dot_volume.cpp
+levelset/cloud/cloud_density.cpp
+'
+
 grep -rn --include='*.h' --include='*.cpp' '^ *#include *"' modeling levelset render apps tests |
-  ROOMS="$rooms" awk '
-    function fail(message) { print "error: " at ": " message " (" included ")"; bad = 1 }
+  ROOMS="$rooms" KNOWN="$known" awk '
+    function fail(message) {
+      if (index(ENVIRON["KNOWN"], "\n" file "\n") && target ~ /^levelset\/io\/(vdb_io|detail\/(openvdb_grid|vdb_assembly))\.h$/) return
+      print "error: " at ": " message " (" included ")"; bad = 1
+    }
     function roomOf(path,  part) { split(path, part, "/"); return part[1] "/" part[2] }
     BEGIN {
       count = split(ENVIRON["ROOMS"], line, "\n")
@@ -45,12 +64,13 @@ grep -rn --include='*.h' --include='*.cpp' '^ *#include *"' modeling levelset re
       included = $0; sub(/^[^"]*"/, "", included); sub(/".*/, "", included)
       from = roomOf(file); isRoom = from in known; part = substr(from, 1, index(from, "/") - 1)
       if ((part == "modeling" || part == "levelset" || part == "render") && !isRoom) fail("not in a room")
+      target = included; sub(/^nephele\//, "", target)
       if (included !~ /^nephele\//) {
         if (included ~ /^(modeling|levelset|render)\//) fail("include it as nephele/...")
         if (isRoom && included ~ /^(apps|tests)\//) fail("a library must not include from apps/ or tests/")
         next
       }
-      target = substr(included, 9); to = roomOf(target)
+      to = roomOf(target)
       if (!(to in known)) fail("no such room")
       if (isRoom && from != to && !((from, to) in may) && !((from, substr(to, 1, index(to, "/") - 1)) in may))
         fail(from " must not include from " to)

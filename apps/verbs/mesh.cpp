@@ -55,7 +55,8 @@ void makeMesh(const MeshOptions& options, Run& run) {
 }  // namespace
 
 Verb meshVerb() {
-  return verbOf("mesh", "Turns a level set or a density into a mesh, or decimates, smooths and subdivides one.",
+  return verbOf("mesh",
+                "Turns a level set or a density into a mesh, or decimates, smooths and subdivides one.",
                 "nephele mesh surface.vdb -o surface.obj --faces 20000", bindOptions, makeMesh);
 }
 

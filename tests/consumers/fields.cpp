@@ -1,7 +1,8 @@
 // The mathematics alone: no grid, mesh or image library is needed.
-#include <cmath>
 #include <nephele/modeling/field/operations.h>
 #include <nephele/modeling/shape/shapes.h>
+
+#include <cmath>
 
 int main() {
   const nephele::ScalarField ball = nephele::sphere({0, 0, 0}, 1.0f);
