@@ -5,6 +5,7 @@
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/cut/cut_input.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 
 namespace nephele::apps {

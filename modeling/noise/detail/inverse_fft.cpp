@@ -27,9 +27,6 @@ std::unique_ptr<Plan, FreePlan> owned(Plan* plan) {
   return std::unique_ptr<Plan, FreePlan>(plan);
 }
 
-const kiss_fft_cpx* raw(const Complex* c) {
-  return reinterpret_cast<const kiss_fft_cpx*>(c);
-}
 kiss_fft_cpx* raw(Complex* c) {
   return reinterpret_cast<kiss_fft_cpx*>(c);
 }
