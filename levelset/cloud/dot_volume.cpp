@@ -196,7 +196,7 @@ struct DotVolume::Impl {
   std::vector<Splat> entries;
 
   explicit Impl(const DotVolumeOptions& o)
-      : options(o), bricks("dots", (o.withColor ? 4 : 1) * kVoxels), perIndex(1.0 / double(o.voxelSize)) {}
+      : options(o), perIndex(1.0 / double(o.voxelSize)), bricks("dots", (o.withColor ? 4 : 1) * kVoxels) {}
 
   std::size_t channels() const { return options.withColor ? 4 : 1; }
 

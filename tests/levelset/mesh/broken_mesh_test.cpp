@@ -80,7 +80,8 @@ INSTANTIATE_TEST_SUITE_P(
                 writeMesh(folder.file("mesh.ply"), m);
               }},
         Entry{"makeCloud", [](const Mesh& m) { makeCloud(m, {.layers = {{}}, .voxelSize = 0.1f}); }},
-        Entry{"estimatedCloudBytes", [](const Mesh& m) { estimatedCloudBytes(m, {.voxelSize = 0.1f}); }},
+        Entry{"estimatedCloudBytes",
+              [](const Mesh& m) { estimatedCloudBytes(m, {.layers = {}, .voxelSize = 0.1f}); }},
         Entry{"attributeField", [](const Mesh& m) { attributeField(m, "heat"); }},
         Entry{"facingField",
               [](const Mesh& m) {
