@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "apps/verbs/detail/turntable_plan.h"
+#include "apps/detail/turntable_plan.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {

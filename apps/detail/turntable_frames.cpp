@@ -10,7 +10,7 @@
 #include <chrono>
 #include <future>
 
-#include "apps/verbs/detail/turntable_plan.h"
+#include "apps/detail/turntable_plan.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/contact_sheet.h"
 #include "nephele/render/image/exr_io.h"

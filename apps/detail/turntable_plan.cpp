@@ -1,5 +1,5 @@
 // What a call of the verb turntable has to make, and what of it is there already.
-#include "apps/verbs/detail/turntable_plan.h"
+#include "apps/detail/turntable_plan.h"
 
 #include <fmt/format.h>
 
