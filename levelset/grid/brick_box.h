@@ -31,17 +31,4 @@ struct BrickBox {
   }
 };
 
-/// A table of one number per brick, in a larger box: -1 for the bricks that are new.
-inline std::vector<std::int32_t> enlarged(const std::vector<std::int32_t>& table, const BrickBox& box,
-                                          const BrickBox& larger) {
-  std::vector<std::int32_t> result(larger.size(), -1);
-  for (int z = 0; z < box.count.z; ++z)
-    for (int y = 0; y < box.count.y; ++y) {
-      const Vec3i row = box.first + Vec3i{0, y, z};
-      std::copy_n(table.begin() + std::ptrdiff_t(box.numberOf(row)), box.count.x,
-                  result.begin() + std::ptrdiff_t(larger.numberOf(row)));
-    }
-  return result;
-}
-
 }  // namespace nephele
