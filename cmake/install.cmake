@@ -9,7 +9,7 @@ foreach(part IN ITEMS headers modeling levelset render)
 endforeach()
 foreach(part IN ITEMS modeling levelset render)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${part} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/nephele
-    FILES_MATCHING PATTERN "*.h" PATTERN detail EXCLUDE)
+    FILES_MATCHING PATTERN "*.h" PATTERN detail EXCLUDE PATTERN "openvdb_*.h" EXCLUDE)
 endforeach()
 if(NEPHELE_BUILD_APPS)
   install(TARGETS nephele)

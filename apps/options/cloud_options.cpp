@@ -111,7 +111,7 @@ void addCloudOptions(CLI::App& app, CloudArguments& a) {
   addDensityOptions(app, a.density);
   addCloudAdvectionOptions(app, a.advection);
   addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another cloud of the same kind.");
-  app.add_flag("--half", a.cloud.halfFloat, "Save 16-bit values.");
+  app.add_flag("--half", a.halfFloat, "Save 16-bit values.");
 }
 
 }  // namespace nephele::apps

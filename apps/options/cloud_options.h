@@ -33,6 +33,7 @@ struct CloudArguments {
   std::optional<double> noiseTime, noisePeriod;
   std::vector<LayerRecipe> recipe;
   CloudOptions cloud;
+  bool halfFloat = false;
 
   /// World units, for a shape with this longest side.
   double voxel(double longestSide) const;

@@ -40,7 +40,7 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
   Mesh mesh;
   if (adaptivityOption->count() > 0) {
     run.begin("adaptive mesh");
-    mesh = adaptiveMesh(file, level, adaptivity);
+    mesh = adaptiveMesh(*toBricks(file), level, adaptivity);
   } else {
     mesh = marchingCubes(*toBricks(file), float(level), run);
   }

@@ -64,22 +64,27 @@ void growCloud(const CloudArguments& arguments, Run& run) {
   run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
   Cloud cloud = makeCloud(shape, options, run);
   run.expect(0.9, 1, 2);
-  cloud.density = arguments.advection.carried(cloud.density, sources, arguments.seed, run);
+  const auto fileOf = [&](VoxelGrid<float>& grid, const char* name, VdbGridInfo::Class gridClass) {
+    return toVdb(std::move(grid), {name, gridClass, arguments.halfFloat});
+  };
+  const VdbGrid density = arguments.advection.carried(
+      fileOf(cloud.density, "density", VdbGridInfo::Class::fogVolume), sources, arguments.seed, run);
   run.stats["layers"] = layersOf(cloud, options, arguments, sources.box());
   run.begin("write");
   auto metadata = run.metadata();
   metadata["seed"] = std::to_string(arguments.seed);
-  writeVdbFile(arguments.output, {cloud.density}, metadata);
-  if (cloud.surface) writeVdbFile(arguments.surface, {*cloud.surface}, metadata);
-  const VdbGridInfo density = describe(cloud.density);
+  writeVdbFile(arguments.output, {density}, metadata);
+  const VdbGridInfo info = describe(density);
   run.stats["grid"] = {{"voxel_size", options.voxelSize},
-                       {"active_voxels", density.activeVoxels},
-                       {"memory_bytes", density.memoryBytes}};
+                       {"active_voxels", info.activeVoxels},
+                       {"memory_bytes", info.memoryBytes}};
   run.result(fmt::format("{}: grid 'density', voxel size {:g}, {} active voxels", arguments.output,
-                         options.voxelSize, density.activeVoxels));
-  if (cloud.surface)
-    run.result(fmt::format("{}: grid 'surface', {} active voxels", arguments.surface,
-                           describe(*cloud.surface).activeVoxels));
+                         options.voxelSize, info.activeVoxels));
+  if (!cloud.surface) return;
+  const VdbGrid surface = fileOf(*cloud.surface, "surface", VdbGridInfo::Class::levelSet);
+  writeVdbFile(arguments.surface, {surface}, metadata);
+  run.result(
+      fmt::format("{}: grid 'surface', {} active voxels", arguments.surface, describe(surface).activeVoxels));
 }
 
 }  // namespace

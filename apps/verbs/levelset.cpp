@@ -56,14 +56,15 @@ void convert(const LevelsetOptions& options, Run& run) {
   run.requireMemory(
       estimateLevelSetBytes(repaired.mesh, conversion),
       "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");
-  const VdbGrid grid = meshToLevelSet(repaired.mesh, conversion, run);
+  VoxelGrid<float> level = meshToLevelSet(repaired.mesh, conversion, run);
+  const double volume = enclosedVolume(level);
 
   run.begin("write");
+  const VdbGrid grid = toVdb(std::move(level), {"surface", VdbGridInfo::Class::levelSet});
   writeVdbFile(options.output, {grid}, run.metadata());
 
   run.begin("describe");
   const VdbGridInfo info = describe(grid);
-  const double volume = enclosedVolume(grid);
   run.stats["mesh"] = {{"vertices", repaired.after.vertices},
                        {"triangles", repaired.after.triangles},
                        {"closed", repaired.after.closed()},

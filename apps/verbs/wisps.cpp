@@ -3,6 +3,7 @@
 #include "apps/app.h"
 #include "apps/options/wisps_options.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 
 namespace nephele::apps {
 namespace {
@@ -36,7 +37,10 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
   run.begin("write");
   auto metadata = run.metadata();
   metadata["seed"] = std::to_string(arguments.seed);
-  const std::vector<VdbGrid> grids = volume.toVdb("density", arguments.halfFloat);
+  using Class = VdbGridInfo::Class;
+  std::vector<VdbGrid> grids{toVdb(volume.densityGrid(), {"density", Class::fogVolume, arguments.halfFloat})};
+  if (options.dots.withColor)
+    grids.push_back(toVdb(volume.colorGrid(), {"Cd", Class::unknown, arguments.halfFloat}));
   writeVdbFile(arguments.output, grids, metadata);
   if (!arguments.points.empty()) writeMesh(arguments.points, points);
 

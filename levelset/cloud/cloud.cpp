@@ -6,6 +6,7 @@
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/nearest_on_mesh.h"
@@ -101,13 +102,11 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
                            {.voxelSize = options.voxelSize,
                             .edgeThickness = options.edgeThickness,
                             .edgeExponent = options.edgeExponent,
-                            .factor = options.densityFactor,
-                            .halfFloat = options.halfFloat},
+                            .factor = options.densityFactor},
                            progress),
               {},
               std::move(cumulo.layers)};
-  if (options.withSurface)
-    cloud.surface = cloudSurface(cumulo, options.voxelSize, options.halfFloat, progress);
+  if (options.withSurface) cloud.surface = cloudSurface(cumulo, options.voxelSize, progress);
   return cloud;
 }
 

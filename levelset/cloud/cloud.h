@@ -27,12 +27,13 @@ struct CloudOptions {
   ScalarField densityFactor{1.0f};
   /// Makes the displaced level set, too.
   bool withSurface = false;
-  bool halfFloat = false;
 };
 
 struct Cloud {
-  VdbGrid density;
-  std::optional<VdbGrid> surface;
+  /// As `cloudDensity` gives it.
+  VoxelGrid<float> density;
+  /// As `cloudSurface` gives it.
+  std::optional<VoxelGrid<float>> surface;
   std::vector<CumuloLayerReport> layers;
 };
 

@@ -1,14 +1,10 @@
 // Works strip by strip, each an octree from blocks of 32^3 voxels down to leaves of 8^3. A sampled estimate
 // of the surface settles most of it: a cell whose range lies beyond the edge by more than the estimate's
-// error is one tile, and so is such a voxel; only voxels that are near the edge are read from the exact sum.
-// Leaves go straight into an OpenVDB tree, because the bricks that the rest of the library samples from would
-// hold every value almost three times.
+// error is constant, and so is such a voxel; only voxels that are near the edge are read from the exact sum.
 //
 // Limits: at a crease of the surface the estimate can be off by more than its stated error; the voxels
 // concerned then differ by less than an edge thickness in position.
 #include "nephele/levelset/cloud/cloud_density.h"
-
-#include <openvdb/tools/Prune.h>
 
 #include <algorithm>
 #include <array>
@@ -20,7 +16,6 @@
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/large_buffer.h"
-#include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -28,28 +23,26 @@ namespace nephele {
 
 namespace {
 
-using Leaf = openvdb::FloatTree::LeafNodeType;
-
-constexpr int kLeaf = int(Leaf::DIM);
+constexpr int kBrick = kBrickSide;
+constexpr std::size_t kCount = kBrickSamples;
 constexpr int kBlock = 32;
 constexpr int kLevelSetHalfWidth = 3;
 
-/// What values of l become in the file.
+/// What values of l become in the grid.
 class DensityRule {
  public:
   DensityRule(const ScalarField& edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
-  /// Values of l in `box` at and beyond whose ends the file's values do not change.
+  /// Values of l in `box` at and beyond whose ends the grid's values do not change.
   Interval band(const Box& box) const {
     const float edge = edge_.range(box).max;
     return {-edge / 2, edge / 2};
   }
   DensityRule restrictedTo(const Box& box) const { return {edge_.restrictedTo(box), exponent_}; }
   void apply(const PointSpans& points, std::span<float> l) const {
-    std::array<float, Leaf::SIZE> edge;
+    std::array<float, kCount> edge;
     edge_.eval(points, std::span<float>(edge));
     for (std::size_t i = 0; i < l.size(); ++i) l[i] = value(l[i], edge[i]);
   }
-  bool isActive(float value) const { return value > 0; }
   float background() const { return 0; }
   float inside() const { return 1; }
 
@@ -70,11 +63,10 @@ class LevelSetRule {
   Interval band(const Box&) const { return {-halfWidth_, halfWidth_}; }
   LevelSetRule restrictedTo(const Box&) const { return *this; }
   void apply(const PointSpans&, std::span<float> l) const {
-    for (float& value : l) value = -std::clamp(value, -halfWidth_, halfWidth_);
+    for (float& value : l) value = std::clamp(value, -halfWidth_, halfWidth_);
   }
-  bool isActive(float value) const { return std::abs(value) < halfWidth_; }
-  float background() const { return halfWidth_; }
-  float inside() const { return -halfWidth_; }
+  float background() const { return -halfWidth_; }
+  float inside() const { return halfWidth_; }
 
  private:
   float halfWidth_;
@@ -82,39 +74,40 @@ class LevelSetRule {
 
 /// What one block of the octree came to.
 struct Block {
-  struct Tile {
-    openvdb::Coord origin;
+  struct Constant {
+    Vec3i brick;
     float value;
   };
-  std::vector<std::unique_ptr<Leaf>> leaves;
-  std::vector<Tile> tiles;
+  std::vector<Vec3i> bricks;
+  /// Of all bricks, one after the other.
+  std::vector<float> samples;
+  std::vector<Constant> constants;
 };
 
 template <class Rule>
-class TreeBuilder {
+class GridBuilder {
  public:
-  TreeBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor)
+  GridBuilder(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor)
       : cloud_(cloud),
         voxel_(voxelSize),
         rule_(rule),
         factor_(factor),
         box_(cloud.box.expanded(rule.band(Box::everywhere()).max)) {}
 
-  openvdb::FloatTree::Ptr build(const Progress& progress) const {
+  VoxelGrid<float> build(const std::string& maker, const Progress& progress) const {
     const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
     const Vec3f low = box_.min, high = box_.max;
     const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
     const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
-    auto tree = std::make_shared<openvdb::FloatTree>(rule_.background());
+    VoxelGrid<float> grid(maker, double(voxel_), rule_.background());
     const int width = stripWidth(), strips = (count.y + width - 1) / width;
     for (int i = 0; i < count.z * strips; ++i) {
       const int y = i % strips * width;
       const Vec3i strip{count.x, std::min(width, count.y - y), 1};
-      addStrip(first + Vec3i{0, y, i / strips}, strip, *tree, progress);
+      addStrip(first + Vec3i{0, y, i / strips}, strip, grid, progress);
       progress.advance(double(i + 1) / (count.z * strips));
     }
-    openvdb::tools::pruneTiles(*tree);
-    return tree;
+    return grid;
   }
 
  private:
@@ -126,7 +119,7 @@ class TreeBuilder {
   }
 
   /// Adds the blocks from `corner` on.
-  void addStrip(const Vec3i& corner, const Vec3i& count, openvdb::FloatTree& tree,
+  void addStrip(const Vec3i& corner, const Vec3i& count, VoxelGrid<float>& grid,
                 const Progress& progress) const {
     const ScalarField estimate = sampledEstimate(corner, count);
     std::vector<Block> blocks(std::size_t(count.x) * std::size_t(count.y));
@@ -138,7 +131,7 @@ class TreeBuilder {
         split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, blocks[b]);
       }
     });
-    move(blocks, tree);
+    move(blocks, grid);
   }
 
   Box boxOfVoxels(const Vec3i& first, const Vec3i& count) const {
@@ -175,19 +168,19 @@ class TreeBuilder {
     const Interval factor = source.factor.range(box);
     if (factor == Interval::of(0)) return;
     if (l.min >= settled.max && factor.isPoint()) {
-      for (int z = 0; z < width; z += kLeaf)
-        for (int y = 0; y < width; y += kLeaf)
-          for (int x = 0; x < width; x += kLeaf)
-            block.tiles.push_back({{first.x + x, first.y + y, first.z + z}, rule_.inside() * factor.min});
+      for (int z = 0; z < width; z += kBrick)
+        for (int y = 0; y < width; y += kBrick)
+          for (int x = 0; x < width; x += kBrick)
+            block.constants.push_back({brickOf(first + Vec3i{x, y, z}), rule_.inside() * factor.min});
       return;
     }
-    if (width == kLeaf) return evaluate(first, source, {band, settled, l.min >= settled.max, factor}, block);
+    if (width == kBrick) return evaluate(first, source, {band, settled, l.min >= settled.max, factor}, block);
     const int half = width / 2;
     for (int i = 0; i < 8; ++i)
       split(first + Vec3i{i & 1 ? half : 0, i & 2 ? half : 0, i & 4 ? half : 0}, half, source, block);
   }
 
-  /// What is known about a leaf by ranges.
+  /// What is known about a brick by ranges.
   struct Known {
     Interval band, settled;
     bool isInside;
@@ -195,13 +188,11 @@ class TreeBuilder {
   };
 
   void evaluate(const Vec3i& first, const Source& source, const Known& known, Block& block) const {
-    constexpr int kCount = int(Leaf::SIZE);
     std::array<float, kCount> x, y, z, l;
-    for (int i = 0; i < kCount; ++i) {
-      // Leaves run along z fastest.
-      x[i] = float(first.x + (i >> 6)) * voxel_;
-      y[i] = float(first.y + (i >> 3 & 7)) * voxel_;
-      z[i] = float(first.z + (i & 7)) * voxel_;
+    for (int i = 0; i < int(kCount); ++i) {
+      x[std::size_t(i)] = float(first.x + (i & 7)) * voxel_;
+      y[std::size_t(i)] = float(first.y + (i >> 3 & 7)) * voxel_;
+      z[std::size_t(i)] = float(first.z + (i >> 6)) * voxel_;
     }
     if (known.isInside)
       l.fill(known.settled.max);
@@ -209,9 +200,9 @@ class TreeBuilder {
       source.estimate.eval({x, y, z}, std::span<float>(l));
 
     std::array<float, kCount> nearX, nearY, nearZ, exact;
-    std::array<int, kCount> place;
+    std::array<std::size_t, kCount> place;
     std::size_t count = 0;
-    for (int i = 0; i < kCount; ++i) {
+    for (std::size_t i = 0; i < kCount; ++i) {
       if (l[i] <= known.settled.min || l[i] >= known.settled.max) continue;
       nearX[count] = x[i];
       nearY[count] = y[i];
@@ -221,7 +212,7 @@ class TreeBuilder {
     if (count > 0) {
       const auto part = [&](std::array<float, kCount>& a) { return std::span<float>(a).first(count); };
       cloud_.surface.eval({part(nearX), part(nearY), part(nearZ)}, part(exact));
-      for (std::size_t i = 0; i < count; ++i) l[std::size_t(place[i])] = exact[i];
+      for (std::size_t i = 0; i < count; ++i) l[place[i]] = exact[i];
     }
 
     bool inside = true, outside = true;
@@ -229,8 +220,8 @@ class TreeBuilder {
       inside &= value >= known.band.max;
       outside &= value <= known.band.min;
     }
-    const openvdb::Coord origin(first.x, first.y, first.z);
-    if (inside && known.factor.isPoint()) block.tiles.push_back({origin, rule_.inside() * known.factor.min});
+    if (inside && known.factor.isPoint())
+      block.constants.push_back({brickOf(first), rule_.inside() * known.factor.min});
     if ((inside && known.factor.isPoint()) || outside) return;
     source.rule.apply({x, y, z}, std::span<float>(l));
     std::array<float, kCount> factor;
@@ -238,23 +229,25 @@ class TreeBuilder {
       factor.fill(known.factor.min);
     else
       source.factor.eval({x, y, z}, std::span<float>(factor));
-    auto leaf = std::make_unique<Leaf>(origin, rule_.background(), false);
-    for (int i = 0; i < kCount; ++i) {
-      const float value = l[i] * factor[i];
-      leaf->buffer().setValue(openvdb::Index(i), value);
-      leaf->setActiveState(openvdb::Index(i), rule_.isActive(value));
-    }
-    block.leaves.push_back(std::move(leaf));
+    block.bricks.push_back(brickOf(first));
+    for (std::size_t i = 0; i < kCount; ++i) block.samples.push_back(l[i] * factor[i]);
   }
 
-  /// Puts what `blocks` hold into `tree`.
-  void move(std::vector<Block>& blocks, openvdb::FloatTree& tree) const {
-    openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor(tree);
-    for (Block& block : blocks) {
-      for (const Block::Tile& tile : block.tiles)
-        accessor.addTile(1, tile.origin, tile.value, rule_.isActive(tile.value));
-      for (std::unique_ptr<Leaf>& leaf : block.leaves) accessor.addLeaf(leaf.release());
+  /// Puts what `blocks` hold into `grid`.
+  void move(const std::vector<Block>& blocks, VoxelGrid<float>& grid) const {
+    std::vector<float*> targets;
+    std::vector<std::size_t> starts;
+    for (const Block& block : blocks) {
+      for (const Block::Constant& constant : block.constants)
+        grid.setConstant(constant.brick, constant.value);
+      starts.push_back(targets.size());
+      for (const Vec3i& brick : block.bricks) targets.push_back(grid.add(brick));
     }
+    parallelFor(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b)
+        for (std::size_t i = 0; i < blocks[b].bricks.size(); ++i)
+          std::copy_n(blocks[b].samples.data() + i * kCount, kCount, targets[starts[b] + i]);
+    });
   }
 
   const GriddedCumulo& cloud_;
@@ -265,24 +258,10 @@ class TreeBuilder {
   Box box_;
 };
 
-template <class Rule>
-VdbGrid buildGrid(const GriddedCumulo& cloud, float voxelSize, const Rule& rule, const ScalarField& factor,
-                  const VdbGridLabel& label, const Progress& progress) {
-  detail::initializeOpenVdb();
-  detail::releaseFreed();
-  auto grid = openvdb::FloatGrid::create(TreeBuilder<Rule>(cloud, voxelSize, rule, factor).build(progress));
-  grid->setName(label.name);
-  grid->setGridClass(label.gridClass == VdbGridInfo::Class::levelSet ? openvdb::GRID_LEVEL_SET
-                                                                     : openvdb::GRID_FOG_VOLUME);
-  grid->setSaveFloatAsHalf(label.halfFloat);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(double(voxelSize)));
-  return detail::wrapGrid(grid);
-}
-
 }  // namespace
 
-VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
-                     const Progress& progress) {
+VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                              const Progress& progress) {
   require(options.voxelSize > 0,
           "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   const Interval edge = options.edgeThickness.range(Box::everywhere());
@@ -295,15 +274,17 @@ VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& opti
   require(factor.min >= 0,
           "cloudDensity: the factor must not be negative, got values from " + std::to_string(factor.min));
   progress.begin("density");
-  return buildGrid(cloud, options.voxelSize, DensityRule(options.edgeThickness, options.edgeExponent),
-                   options.factor, {"density", VdbGridInfo::Class::fogVolume, options.halfFloat}, progress);
+  detail::releaseFreed();
+  const DensityRule rule(options.edgeThickness, options.edgeExponent);
+  return GridBuilder(cloud, options.voxelSize, rule, options.factor).build("density", progress);
 }
 
-VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat, const Progress& progress) {
+VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize, const Progress& progress) {
   require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
   progress.begin("surface");
-  return buildGrid(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize), 1.0f,
-                   {"surface", VdbGridInfo::Class::levelSet, halfFloat}, progress);
+  detail::releaseFreed();
+  return GridBuilder(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize), 1.0f)
+      .build("surface", progress);
 }
 
 }  // namespace nephele

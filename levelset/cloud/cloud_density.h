@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "nephele/levelset/cloud/layers_on_grids.h"
-#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/grid/voxel_grid.h"
 
 namespace nephele {
 
@@ -18,28 +18,26 @@ struct CloudDensityOptions {
   std::optional<float> edgeExponent{};
   /// Multiplies the density; nowhere negative. See modeling/cloud/density_profile.h.
   ScalarField factor{1.0f};
-  bool halfFloat = false;
 };
 
-/// The cloud as fog: grid `density`, class fog volume, background 0.
+/// The cloud as fog: densities, 0 outside.
 ///
 /// The value is smoothstep(-edge / 2, edge / 2, l): 1 inside, 0 outside, 1/2 on the surface; or the power of
 /// t that the options ask for; times the factor. l is not a distance but grows faster than one, so the edge
 /// is as thick as stated or thinner, at any voxel size; an edge thicker than 6 voxels needs
-/// CumuloGridOptions::edge. Inner bricks are tiles where the factor's range is a single value. Cost grows
+/// CumuloGridOptions::edge. Inner bricks are constant where the factor's range is a single value. Cost grows
 /// with the bricks that the edge crosses and those in which the factor varies. All cores; the same bits at
 /// any thread count.
 /// @throws Error if a length or the exponent is not > 0, or the factor can be negative; Cancelled.
-VdbGrid cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
-                     const Progress& progress = silent());
+VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                              const Progress& progress = silent());
 
-/// The displaced level set: grid `surface`, class level set, negative inside as files are, 3 voxels to either
-/// side.
+/// The displaced level set, positive inside, 3 voxels to either side.
 ///
-/// Its values are -l where |l| < 3 voxels. The zero surface is exact; away from it |l| grows faster than the
+/// Its values are l where |l| < 3 voxels. The zero surface is exact; away from it |l| grows faster than the
 /// distance (1.2 to 1.8 times), as l is a sum of displacements and not a distance.
 /// @throws Error if voxelSize is not > 0; Cancelled.
-VdbGrid cloudSurface(const GriddedCumulo& cloud, float voxelSize, bool halfFloat,
-                     const Progress& progress = silent());
+VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize,
+                              const Progress& progress = silent());
 
 }  // namespace nephele

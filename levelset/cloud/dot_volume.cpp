@@ -7,7 +7,7 @@
 // A batch of splats is sorted by brick: a splat has an entry in every brick that it touches (1.4 on average).
 // Counting and placing entries use atomic counters beside the numbers of a sparse table of bricks; each brick
 // then sorts its entries by number, which makes the order that of the input whatever the threads did, and
-// adds them up, alone. Samples are kept in the order of OpenVDB's leaves, so that writing copies them.
+// adds them up, alone.
 //
 // Places are computed in double precision, from the dots each time that they are asked for, and kept in
 // single precision only relative to a brick: a dot lands in the right voxel however far from the origin it
@@ -24,11 +24,12 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <vector>
 
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/grid/sparse_bricks.h"
-#include "nephele/levelset/io/detail/openvdb_grid.h"
-#include "nephele/levelset/io/detail/vdb_assembly.h"
+#include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele {
@@ -275,6 +276,15 @@ struct DotVolume::Impl {
     }
   }
 
+  /// visit(brick, number), in the order of the numbers.
+  template <class Visit>
+  void forEachNumber(const Visit& visit) const {
+    const detail::BrickTable& table = bricks.table();
+    std::vector<Vec3i> positions(bricks.count());
+    for (std::size_t place = detail::BrickTable::kPlaces; place < table.placeCount(); ++place)
+      if (table[place] >= 0) positions[std::size_t(table[place])] = table.brickAt(place);
+    for (std::size_t i = 0; i < positions.size(); ++i) visit(positions[i], std::int32_t(i));
+  }
   const float* sampleAt(const Vec3i& voxel) const;
   void requireSound(const DotSpans& dots) const;
   void addBatch(const DotSpans& dots, const Progress& progress);
@@ -544,64 +554,63 @@ std::size_t DotVolume::memoryBytes() const {
 
 namespace {
 
-/// Colours of one brick: sums over density, and the mean where there is none. False if there is none at all.
-bool fillColors(const float* samples, openvdb::Vec3SGrid::TreeType::LeafNodeType& leaf) {
+/// Colours of one brick, x fastest: sums over density, and the mean where there is none.
+void fillColors(const float* samples, const Vec3f& mean, Vec3f* colors) {
+  for (int z = 0; z < kBrick; ++z)
+    for (int y = 0; y < kBrick; ++y)
+      for (int x = 0; x < kBrick; ++x, ++colors) {
+        const float* const s = samples + 4 * ((x * kBrick + y) * kBrick + z);
+        *colors = s[0] > 0 ? Vec3f{s[1] / s[0], s[2] / s[0], s[3] / s[0]} : mean;
+      }
+}
+
+/// The mean colour of a brick, or nothing if it has none.
+std::optional<Vec3f> meanColor(const float* samples) {
   double sum[4] = {};
   for (std::size_t v = 0; v < kVoxels; ++v)
     for (std::size_t c = 0; c < 4; ++c) sum[c] += double(samples[4 * v + c]);
-  if (!(sum[0] > 0)) return false;
-  const openvdb::Vec3s mean(float(sum[1] / sum[0]), float(sum[2] / sum[0]), float(sum[3] / sum[0]));
-  for (std::size_t v = 0; v < kVoxels; ++v) {
-    const float* const s = samples + 4 * v;
-    leaf.setValueOn(openvdb::Index(v),
-                    s[0] > 0 ? openvdb::Vec3s(s[1] / s[0], s[2] / s[0], s[3] / s[0]) : mean);
-  }
-  return true;
+  if (!(sum[0] > 0)) return std::nullopt;
+  return Vec3f{float(sum[1] / sum[0]), float(sum[2] / sum[0]), float(sum[3] / sum[0])};
 }
 
 }  // namespace
 
-std::vector<VdbGrid> DotVolume::toVdb(const std::string& name, bool halfFloat) const {
-  detail::initializeOpenVdb();
-  const auto transform = openvdb::math::Transform::createLinearTransform(double(impl_->options.voxelSize));
-  const auto density = openvdb::FloatGrid::create(0.0f);
-  density->setName(name);
-  density->setGridClass(openvdb::GRID_FOG_VOLUME);
-  density->setSaveFloatAsHalf(halfFloat);
-  density->setTransform(transform->copy());
-  const detail::BrickTable& table = impl_->bricks.table();
-  detail::assembleTree(density->tree(), table.bricks().first, table.bricks().count,
-                       [&](const Vec3i& position, const openvdb::Coord& origin) -> detail::LeafOrTile {
-                         const float* const samples = impl_->bricks.find(position);
-                         if (!samples) return {nullptr, 0.0f, false};
-                         const auto isActive = [](float v) { return v > 0; };
-                         if (impl_->channels() == 1) return detail::leafOf(samples, origin, isActive);
-                         float densities[kVoxels];
-                         for (std::size_t v = 0; v < kVoxels; ++v) densities[v] = samples[4 * v];
-                         return detail::leafOf(densities, origin, isActive);
-                       });
-  std::vector<VdbGrid> grids{detail::wrapGrid(density)};
-  if (!impl_->options.withColor) return grids;
-
-  using Leaf = openvdb::Vec3SGrid::TreeType::LeafNodeType;
-  const auto color = openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0f));
-  color->setName("Cd");
-  color->setSaveFloatAsHalf(halfFloat);
-  color->setTransform(transform->copy());
-  std::vector<std::unique_ptr<Leaf>> leaves(table.placeCount());
-  parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
+VoxelGrid<float> DotVolume::densityGrid() const {
+  VoxelGrid<float> grid("dots", double(impl_->options.voxelSize), 0.0f);
+  impl_->forEachNumber([&](const Vec3i& brick, std::int32_t) { grid.add(brick); });
+  const std::size_t channels = impl_->channels();
+  parallelFor(impl_->bricks.count(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (table[i] < 0) continue;
-      const Vec3i origin = table.brickAt(i) * kBrick;
-      leaves[i] =
-          std::make_unique<Leaf>(openvdb::Coord(origin.x, origin.y, origin.z), openvdb::Vec3s(0.0f), false);
-      if (!fillColors(impl_->bricks.samples(table[i]), *leaves[i])) leaves[i].reset();
+      const float* const samples = impl_->bricks.samples(std::int32_t(i));
+      float* target = grid.samples(std::int32_t(i));
+      for (int z = 0; z < kBrick; ++z)
+        for (int y = 0; y < kBrick; ++y)
+          for (int x = 0; x < kBrick; ++x)
+            *target++ = samples[std::size_t((x * kBrick + y) * kBrick + z) * channels];
     }
   });
-  for (auto& leaf : leaves)
-    if (leaf) color->tree().addLeaf(leaf.release());
-  grids.push_back(detail::wrapGrid(color));
-  return grids;
+  return grid;
+}
+
+VoxelGrid<Vec3f> DotVolume::colorGrid() const {
+  require(impl_->options.withColor, "dots: no colours are kept");
+  std::vector<std::optional<Vec3f>> means(impl_->bricks.count());
+  parallelFor(means.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) means[i] = meanColor(impl_->bricks.samples(std::int32_t(i)));
+  });
+  VoxelGrid<Vec3f> grid("dots", double(impl_->options.voxelSize), Vec3f{});
+  std::vector<std::size_t> numbers;
+  impl_->forEachNumber([&](const Vec3i& brick, std::int32_t number) {
+    if (!means[std::size_t(number)]) return;
+    grid.add(brick);
+    numbers.push_back(std::size_t(number));
+  });
+  parallelFor(numbers.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      fillColors(impl_->bricks.samples(std::int32_t(numbers[i])), *means[numbers[i]],
+                 grid.samples(std::int32_t(i)));
+  });
+  return grid;
 }
 
 double estimatedDotVolumeBytes(const Box& box, double brickCount, double dotCount,

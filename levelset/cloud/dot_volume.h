@@ -2,10 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <vector>
 
-#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/cloud/dots.h"
 
@@ -62,12 +60,14 @@ class DotVolume {
   /// Sum of all masses.
   double mass() const;
   std::size_t brickCount() const;
-  /// Bytes held, and those that the grids of `toVdb` will hold.
+  /// Bytes held, and those that its grids will hold.
   std::size_t memoryBytes() const;
 
-  /// A grid of class fog volume called `name`, and `Cd` where colours are kept. Voxels without density, in
-  /// bricks that hold some, have the mean colour of their brick, so that interpolation does not darken edges.
-  std::vector<VdbGrid> toVdb(const std::string& name = "density", bool halfFloat = false) const;
+  /// Densities, 0 where there is none.
+  VoxelGrid<float> densityGrid() const;
+  /// Colours, black beyond the bricks that hold some. Voxels without density in such a brick have its mean
+  /// colour, so that interpolation does not darken edges. @throws Error if no colours are kept.
+  VoxelGrid<Vec3f> colorGrid() const;
 
  private:
   struct Impl;

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_distance.h"
 
@@ -28,15 +28,14 @@ std::shared_ptr<BrickGrid> nearSurface(const ScalarField& level, BakeOptions spe
 
 ScalarField sweptDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,
                           const Progress& progress) {
-  const VdbGrid narrow =
-      toVdb(*nearSurface(level, spec, progress), {"surface", VdbGridInfo::Class::levelSet, false});
-  const auto source = detail::floatGrid(narrow);
+  const auto near = nearSurface(level, spec, progress);
+  const auto source = detail::toOpenVdb(*near, detail::TreeValues::levelSet(*near, "surface"), "surface");
+  source->setGridClass(openvdb::GRID_LEVEL_SET);
   const float width = std::max(band.exterior, band.interior) / spec.voxelSize - kHalfWidthVoxels;
   const auto distance =
       openvdb::tools::dilateSdf(*openvdb::tools::sdfToSdf(*source), std::max(1, int(std::ceil(width))));
-  distance->setGridClass(openvdb::GRID_LEVEL_SET);
   progress.check();
-  return gridField(toBricks(detail::wrapGrid(distance)), Interpolation::tricubic);
+  return gridField(detail::bricksOf(*distance, -1.0f), Interpolation::tricubic);
 }
 
 ScalarField rebuiltDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,

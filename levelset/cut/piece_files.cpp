@@ -23,6 +23,7 @@
 #include "nephele/levelset/cut/detail/piece_measures.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/obj_text.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_band.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/error.h"
@@ -213,9 +214,9 @@ class PieceWriter {
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
             const Piece& piece = pieces_.pieces[i];
-            const std::shared_ptr<const BrickGrid> level =
-                piece.level ? piece.level->toBricks() : levelOf(piece.mesh, voxelSize);
-            grids[i] = toVdb(*level, {piece.name, VdbGridInfo::Class::levelSet});
+            const VdbGridLabel label{piece.name, VdbGridInfo::Class::levelSet};
+            grids[i] = piece.level ? toVdb(*piece.level->toBricks(), label)
+                                   : toVdb(levelOf(piece.mesh, voxelSize), label);
           }
         },
         progress);
@@ -224,11 +225,10 @@ class PieceWriter {
     writeVdbFile(folder_.temporary(index), all, options_.metadata);
   }
 
-  static std::shared_ptr<const BrickGrid> levelOf(const Mesh& mesh, double voxelSize) {
+  static VoxelGrid<float> levelOf(const Mesh& mesh, double voxelSize) {
     const detail::BandOptions options{.voxelSize = voxelSize};
-    const detail::SurfaceGeometry surface = detail::surfaceGeometry(mesh);
-    if (const auto band = detail::signedBand(surface, options, silent())) return detail::bandToBricks(*band);
-    return toBricks(detail::meshToVdb(mesh, options, silent()));
+    auto band = detail::signedBand(detail::surfaceGeometry(mesh), options, silent());
+    return band ? *std::move(band) : detail::floodedBand(mesh, options, silent());
   }
 
   void writeList(std::size_t index) {

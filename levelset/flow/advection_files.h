@@ -29,10 +29,6 @@ CarriedGrids carriedGrids(const std::vector<VdbGrid>& grids);
 std::vector<VdbGrid> toVdb(const CarriedGrids& like,
                            const std::vector<std::shared_ptr<const BrickGrid>>& bricks);
 
-/// A vector grid of three components on one lattice; those of class staggered stand half a voxel below each
-/// other's, as readVectorGrid gives them. Voxels where a component differs from its background are active.
-VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label);
-
 /// A map as the grids of a file: `displacement` (X - x, what readFlowMap reads) and `rest` (X, for textures
 /// that travel with the matter).
 std::vector<VdbGrid> toVdb(const FlowMap& map);

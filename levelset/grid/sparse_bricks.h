@@ -14,6 +14,9 @@ namespace nephele::detail {
 template <class Sample>
 class SparseBricks {
  public:
+  /// Bricks whose samples are allocated at a time.
+  static constexpr std::size_t kTogether = 512;
+
   /// `maker` begins the messages of errors.
   explicit SparseBricks(std::string maker, std::size_t samplesPerBrick = kBrickSamples)
       : table_(std::move(maker)), samplesPerBrick_(samplesPerBrick) {}
@@ -42,6 +45,11 @@ class SparseBricks {
     const std::int32_t number = table_.at(brick);
     return number < 0 ? nullptr : samples(number);
   }
+  /// Gives back the samples of the bricks with these numbers, which must not be asked for again. Numbers
+  /// begin and end at multiples of kTogether.
+  void release(std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; i += kTogether) samples_[i / kTogether].reset();
+  }
   BrickTable& table() { return table_; }
   const BrickTable& table() const { return table_; }
   /// Bytes held.
@@ -50,9 +58,6 @@ class SparseBricks {
   }
 
  private:
-  /// Bricks whose samples are allocated at a time.
-  static constexpr std::size_t kTogether = 512;
-
   BrickTable table_;
   std::size_t samplesPerBrick_, count_ = 0;
   std::vector<std::unique_ptr<Sample[]>> samples_;

@@ -11,10 +11,13 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <istream>
 #include <streambuf>
+#include <string_view>
+#include <vector>
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 
@@ -25,56 +28,99 @@ namespace {
 /// The largest node, 32^3 vectors of three doubles, and some.
 constexpr std::int64_t kLargestRawBlock = std::int64_t(1) << 20;
 
-/// The bytes of a file as a stream that throws rather than end.
+/// The bytes of a file as a stream that throws rather than end. Only a window of the file is in memory.
 class FileBytes final : public std::streambuf {
  public:
-  explicit FileBytes(const std::string& path) {
-    std::ifstream file(path, std::ios::binary | std::ios::ate);
-    size_ = file ? std::int64_t(file.tellg()) : -1;
+  explicit FileBytes(const std::string& path)
+      : file_(path, std::ios::binary | std::ios::ate), window_(std::size_t(kWindow)) {
+    size_ = file_ ? std::int64_t(file_.tellg()) : -1;
     if (size_ < 0) throw Error("cannot be read");
-    bytes_.reset(new char[std::size_t(size_)]);
-    file.seekg(0);
-    file.read(bytes_.get(), size_);
-    if (!file) throw Error("cannot be read");
-    setg(bytes_.get(), bytes_.get(), bytes_.get() + size_);
+    moveTo(0);
   }
 
   std::int64_t size() const { return size_; }
-  bool startsWith(std::string_view text) const {
-    return std::string_view(bytes_.get(), std::size_t(size_)).starts_with(text);
+  /// What is left in the window, to be asked at the beginning of the file.
+  bool startsWith(std::string_view text) {
+    if (gptr() == egptr() && size_ > 0) fill();
+    return std::string_view(gptr(), std::size_t(egptr() - gptr())).starts_with(text);
   }
 
  protected:
   int_type underflow() override {
-    throw Error(fmt::format("the file is cut short: it ends after {} bytes", size_));
+    if (position() >= size_) failShort();
+    fill();
+    return traits_type::to_int_type(*gptr());
   }
 
   std::streamsize xsgetn(char* target, std::streamsize count) override {
-    if (count < 0 || count > egptr() - gptr()) underflow();
+    if (count < 0 || count > size_ - position()) failShort();
     // Blocks that could not be compressed stand after minus their length.
     if (lastNumber_ < -kLargestRawBlock && count == -lastNumber_)
       throw Error("damaged: a block of values is longer than any node");
-    std::memcpy(target, gptr(), std::size_t(count));
+    const std::streamsize there = std::min<std::streamsize>(count, egptr() - gptr());
+    std::memcpy(target, gptr(), std::size_t(there));
+    setg(eback(), gptr() + there, egptr());
+    if (const std::streamsize rest = count - there; rest >= kWindow) {
+      readAt(position(), target + there, rest);
+      moveTo(position() + rest);
+    } else if (rest > 0) {
+      fill();
+      std::memcpy(target + there, gptr(), std::size_t(rest));
+      setg(eback(), gptr() + rest, egptr());
+    }
     lastNumber_ = 0;
     if (count == sizeof(lastNumber_)) std::memcpy(&lastNumber_, target, sizeof(lastNumber_));
-    setg(eback(), gptr() + count, egptr());
     return count;
   }
 
   pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
     const off_type base = from == std::ios::beg   ? 0
-                          : from == std::ios::cur ? gptr() - eback()
+                          : from == std::ios::cur ? off_type(position())
                                                   : off_type(size_);
-    if (offset > off_type(size_) - base || offset < -base) underflow();
-    setg(eback(), eback() + base + offset, egptr());
-    return base + offset;
+    if (offset > off_type(size_) - base || offset < -base) failShort();
+    const std::int64_t target = base + offset;
+    if (target >= start_ && target <= start_ + (egptr() - eback()))
+      setg(eback(), eback() + (target - start_), egptr());
+    else
+      moveTo(target);
+    return target;
   }
   pos_type seekpos(pos_type position, std::ios_base::openmode mode) override {
     return seekoff(off_type(position), std::ios::beg, mode);
   }
 
  private:
-  std::unique_ptr<char[]> bytes_;
+  static constexpr std::int64_t kWindow = std::int64_t(1) << 20;
+
+  std::int64_t position() const { return start_ + (gptr() - eback()); }
+
+  [[noreturn]] void failShort() const {
+    throw Error(fmt::format("the file is cut short: it ends after {} bytes", size_));
+  }
+
+  /// An empty window at `position`.
+  void moveTo(std::int64_t position) {
+    start_ = position;
+    setg(window_.data(), window_.data(), window_.data());
+  }
+  /// A full window at the present position.
+  void fill() {
+    moveTo(position());
+    const std::int64_t count = std::min(kWindow, size_ - start_);
+    readAt(start_, window_.data(), count);
+    setg(window_.data(), window_.data(), window_.data() + count);
+  }
+  void readAt(std::int64_t position, char* target, std::int64_t count) {
+    file_.seekg(position);
+    file_.read(target, count);
+    // It was longer when it was opened.
+    if (!file_) throw Error(fmt::format("the file is cut short: it ends before byte {}", position + count));
+  }
+
+  std::ifstream file_;
+  std::vector<char> window_;
+  /// Where in the file the window begins.
+  std::int64_t start_ = 0;
   std::int64_t size_ = 0;
   std::int64_t lastNumber_ = 0;
 };

@@ -63,41 +63,14 @@ std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const det
   });
 }
 
-std::string listGrids(const std::vector<openvdb::GridBase::Ptr>& grids) {
-  if (grids.empty()) return "it holds no grid";
-  std::string list;
-  for (const auto& grid : grids)
-    list += fmt::format("{}'{}' ({})", list.empty() ? "" : ", ", grid->getName(), grid->valueType());
-  return "it holds " + list;
+std::vector<VdbGrid> wrapped(const std::vector<openvdb::GridBase::Ptr>& grids) {
+  std::vector<VdbGrid> result;
+  for (const auto& grid : grids) result.push_back(detail::wrapGrid(grid));
+  return result;
 }
 
 bool isScalar(const openvdb::GridBase& grid) {
   return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
-}
-
-// One float grid per component, with the tree's own tiles.
-template <class VectorGrid>
-std::array<VdbGrid, 3> components(const VectorGrid& grid) {
-  const auto component = [&](int axis) {
-    const auto background = float(grid.background()[axis]);
-    const auto tree = std::make_shared<openvdb::FloatTree>(grid.tree(), background, openvdb::TopologyCopy());
-    const auto values = grid.getConstAccessor();
-    for (auto voxel = tree->beginValueOn(); voxel; ++voxel)
-      voxel.setValue(float(values.getValue(voxel.getCoord())[axis]));
-    const auto scalar = openvdb::FloatGrid::create(tree);
-    scalar->insertMeta(grid);
-    scalar->setGridClass(openvdb::GRID_UNKNOWN);
-    const auto transform = grid.transform().copy();
-    if (grid.getGridClass() == openvdb::GRID_STAGGERED) {
-      openvdb::Vec3d shift(0, 0, 0);
-      shift[axis] = -0.5;
-      transform->preTranslate(shift);
-    }
-    scalar->setTransform(transform);
-    scalar->setName(fmt::format("{}.{}", grid.getName(), "xyz"[axis]));
-    return detail::wrapGrid(scalar);
-  };
-  return {component(0), component(1), component(2)};
 }
 
 }  // namespace
@@ -108,10 +81,19 @@ bool isVolumeFile(const std::string& path) {
 }
 
 std::vector<VdbGrid> readVdbFile(const std::string& path) {
-  std::vector<VdbGrid> result;
-  for (const auto& grid : readGrids(path, [](const auto&, const auto&) { return true; }))
-    result.push_back(detail::wrapGrid(grid));
-  return result;
+  return wrapped(readGrids(path, [](const auto&, const auto&) { return true; }));
+}
+
+std::vector<VdbGrid> readVdbHeaders(const std::string& path) {
+  return wrapped(readGrids(path, [](const auto&, const auto&) { return false; }));
+}
+
+std::string listOf(const std::vector<VdbGrid>& grids) {
+  std::string list;
+  for (const VdbGrid& handle : grids)
+    list += fmt::format("{}'{}' ({})", list.empty() ? "" : ", ", handle.impl().grid->getName(),
+                        handle.impl().grid->valueType());
+  return list.empty() ? "it holds no grid" : "it holds " + list;
 }
 
 VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
@@ -131,16 +113,8 @@ VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
       failReading(path, fmt::format("grid '{}' holds {} values; a scalar (float or double) grid is needed",
                                     name, grid->valueType()));
   }
-  if (name.empty()) failReading(path, "no scalar (float or double) grid; " + listGrids(grids));
-  failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
-}
-
-std::array<VdbGrid, 3> vectorComponents(const VdbGrid& handle) {
-  const openvdb::GridBase::Ptr& grid = handle.impl().grid;
-  if (grid->isType<openvdb::Vec3SGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
-  if (grid->isType<openvdb::Vec3DGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
-  throw Error(fmt::format("grid '{}' holds {} values; a grid of vectors is needed", grid->getName(),
-                          grid->valueType()));
+  if (name.empty()) failReading(path, "no scalar (float or double) grid; " + listOf(wrapped(grids)));
+  failReading(path, fmt::format("no grid '{}'; {}", name, listOf(wrapped(grids))));
 }
 
 std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name) {
@@ -150,7 +124,7 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
     if (grid->getName() != name) continue;
     return translateReadErrors(path, [&] { return vectorComponents(detail::wrapGrid(grid)); });
   }
-  failReading(path, fmt::format("no grid '{}'; {}", name, listGrids(grids)));
+  failReading(path, fmt::format("no grid '{}'; {}", name, listOf(wrapped(grids))));
 }
 
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,

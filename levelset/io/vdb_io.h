@@ -7,13 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/modeling/base/progress.h"
 
 namespace nephele {
 
-/// A grid in OpenVDB's own form; a handle that keeps OpenVDB's headers out of ours.
-/// Level sets in it are negative inside, as in files.
+/// A grid of a file, in OpenVDB's own form: what is read, described and written. A handle that keeps
+/// OpenVDB's headers out of ours. The values are the file's, level sets negative inside; `toBricks` and
+/// `toVdb` turn them.
 class VdbGrid {
  public:
   struct Impl;
@@ -67,6 +69,19 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
 /// The same of a vector grid that was read already. @throws Error naming the grid if it holds no vectors.
 std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid);
 
+/// What the values of a grid are: numbers (float, double), vectors (of float, of double), or anything else.
+enum class VdbValues { scalar, vector, other };
+VdbValues valuesOf(const VdbGrid& grid);
+
+/// The names and types of the grids of a file; their values are not read. @throws Error as readVdbFile.
+std::vector<VdbGrid> readVdbHeaders(const std::string& path);
+
+/// "it holds 'density' (float), 'v' (vec3s)": for messages.
+std::string listOf(const std::vector<VdbGrid>& grids);
+
+/// Around the active voxels of a grid, world units; empty if there are none.
+Box activeBox(const VdbGrid& grid);
+
 /// Bricks of a scalar grid. A level set changes sign (positive inside); fog keeps its values.
 /// @throws Error naming the grid if it holds no scalars, is too large, not finite, or so far from the origin
 /// that single precision would move a voxel by more than an eighth of its size.
@@ -77,12 +92,33 @@ struct VdbGridLabel {
   std::string name;  ///< "density", "surface"
   VdbGridInfo::Class gridClass = VdbGridInfo::Class::unknown;
   bool halfFloat = false;
+  /// Text beside the values.
+  std::map<std::string, std::string> metadata{};
 };
+
+/// The label of a grid, without its metadata.
+VdbGridLabel labelOf(const VdbGrid& grid);
+/// The text that a grid has under a key, if any.
+std::optional<std::string> metadataOf(const VdbGrid& grid, const std::string& key);
+/// Gives a grid all metadata of another, its class and name among them.
+void copyMetadata(const VdbGrid& from, VdbGrid& to);
 
 /// OpenVDB form of bricks. Class level set: sign flips (negative inside), background is half-width x voxel
 /// size, voxels inside the band are active. Class fog volume: voxels with a value > 0 are active, background
 /// 0; constant bricks become tiles.
+/// @throws Error naming the grid if it is packed, a value is not finite, or its background does not fit its
+/// class.
 VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label);
+/// The same of voxels. Those that are handed over give their memory back while the tree takes it.
+VdbGrid toVdb(VoxelGrid<float> voxels, const VdbGridLabel& label);
+/// Voxels of bricks that hold samples are active.
+VdbGrid toVdb(VoxelGrid<Vec3f> voxels, const VdbGridLabel& label);
+/// A vector grid of three components on one lattice; those of class staggered stand half a voxel below each
+/// other's, as readVectorGrid gives them. Voxels where a component differs from its background are active.
+VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label);
+/// The bricks of a vector grid that hold active voxels. @throws Error naming the grid if it holds no vectors
+/// of float, or a value is not finite.
+VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)
 /// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path; no partial file

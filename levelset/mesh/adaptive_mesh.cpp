@@ -1,8 +1,9 @@
 // OpenVDB's dual mesher: one vertex in each cell that the surface crosses, quads between the four cells round
 // a crossed edge, and where the surface is flat to within the adaptivity, several cells share one vertex.
 //
-// OpenVDB takes level sets as negative inside and all other grids as inside where the value is high, and
-// winds polygons clockwise seen from outside; here both become the conventions of the library.
+// OpenVDB takes level sets as negative inside, and winds polygons clockwise seen from outside: both are
+// turned round here. All grids are given to it as level sets, so that samples equal to the isovalue count as
+// outside, as in marching cubes.
 //
 // Limits: OpenVDB's merging can leave edges with more than two faces, and vertices are smoothed off the zero
 // of the interpolant; where a closed manifold is needed, take marching cubes.
@@ -15,22 +16,23 @@
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/grid/openvdb_bridge.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele {
 
-Mesh adaptiveMesh(const VdbGrid& grid, double isovalue, double adaptivity) {
+Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
   require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + std::to_string(isovalue));
   require(adaptivity >= 0 && adaptivity <= 1,
           "adaptiveMesh: adaptivity must be in [0, 1], got " + std::to_string(adaptivity));
-  const openvdb::FloatGrid::ConstPtr values = detail::floatGrid(grid);
-  const bool isLevelSet = values->getGridClass() == openvdb::GRID_LEVEL_SET;
+  require(!grid.isPacked(), "adaptiveMesh: the grid must not be packed");
+  const auto values = detail::toOpenVdb(grid, detail::TreeValues::negated(grid.background), "");
+  values->setGridClass(openvdb::GRID_LEVEL_SET);
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;
   std::vector<openvdb::Vec4I> quads;
   try {
-    openvdb::tools::volumeToMesh(*values, points, triangles, quads, isLevelSet ? -isovalue : isovalue,
-                                 adaptivity);
+    openvdb::tools::volumeToMesh(*values, points, triangles, quads, -isovalue, adaptivity);
   } catch (const openvdb::Exception& problem) {
     throw Error("adaptiveMesh: " + std::string(problem.what()));
   }

@@ -1,7 +1,8 @@
 #pragma once
 
-#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
 
 namespace nephele {
 

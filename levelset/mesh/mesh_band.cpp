@@ -23,8 +23,6 @@
 #include <limits>
 
 #include "nephele/levelset/grid/brick_table.h"
-#include "nephele/levelset/grid/large_buffer.h"
-#include "nephele/levelset/io/detail/vdb_assembly.h"
 #include "nephele/levelset/mesh/triangle_kernels.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -219,7 +217,7 @@ bool sidesFit(const Sides& sides, const float* distance) {
 /// What the work on one brick leaves.
 enum class BlockState { empty, done, contradictory };
 
-BlockState workBrick(const BrickLists& lists, const SurfaceGeometry& surface, const BandBlocks& band,
+BlockState workBrick(const BrickLists& lists, const SurfaceGeometry& surface, const BandOptions& options,
                      std::size_t brick, std::vector<PlacedTriangle>& placed, float* values) {
   NearestSamples nearest;
   std::fill_n(nearest.squared, NearestSamples::kSize, lists.band() * lists.band());
@@ -248,8 +246,8 @@ BlockState workBrick(const BrickLists& lists, const SurfaceGeometry& surface, co
   float distance[NearestSamples::kSize];
   for (int i = 0; i < NearestSamples::kSize; ++i) distance[i] = std::sqrt(nearest.squared[i]);
   if (!sides.spread() || !sidesFit(sides, distance)) return BlockState::contradictory;
-  const auto voxel = float(band.options.voxelSize);
-  const float low = band.outsideValue(), high = band.insideValue();
+  const auto voxel = float(options.voxelSize);
+  const float low = options.outsideValue(), high = options.insideValue();
   for (int i = 0; i < NearestSamples::kSize; ++i) {
     const bool inside = sides.inside.planes[std::size_t(i / 64)] >> (i % 64) & 1;
     values[i] = inside ? std::min(distance[i] * voxel, high) : std::max(-distance[i] * voxel, low);
@@ -263,27 +261,31 @@ bool isInsideValue(float value) {
   return value > 0;
 }
 
+/// What stands at each brick position: kOutside, kInside or the number of a brick with samples.
+using Entries = std::vector<std::int32_t>;
+constexpr std::int32_t kOutside = -1, kInside = -2;
+
 /// Sets constant bricks from the bricks before them along x. False if the sides do not fit.
-bool fillConstants(BandBlocks& band, const std::vector<BlockState>& states) {
-  const auto rowLength = std::size_t(band.bricks.count.x);
+bool fillConstants(const VoxelGrid<float>& band, std::size_t rowLength, const std::vector<BlockState>& states,
+                   Entries& entries) {
   std::atomic<bool> fit{true};
-  parallelFor(band.table.size() / rowLength, 64, [&](std::size_t begin, std::size_t end) {
+  parallelFor(entries.size() / rowLength, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
-      std::int32_t side = BandBlocks::kOutside;
+      std::int32_t side = kOutside;
       bool afterConstant = true;
       for (std::size_t x = 0; x < rowLength; ++x) {
-        std::int32_t& entry = band.table[row * rowLength + x];
+        std::int32_t& entry = entries[row * rowLength + x];
         if (entry < 0 || states[std::size_t(entry)] == BlockState::empty) {
           entry = side;
           afterConstant = true;
           continue;
         }
-        const float* samples = band.samples.data() + std::size_t(entry) * BandBlocks::kSamples;
-        if (afterConstant && isInsideValue(samples[0]) != (side == BandBlocks::kInside)) fit = false;
-        side = isInsideValue(samples[kBrick - 1]) ? BandBlocks::kInside : BandBlocks::kOutside;
+        const float* samples = band.samples(entry);
+        if (afterConstant && isInsideValue(samples[0]) != (side == kInside)) fit = false;
+        side = isInsideValue(samples[kBrick - 1]) ? kInside : kOutside;
         afterConstant = false;
       }
-      if (side != BandBlocks::kOutside) fit = false;
+      if (side != kOutside) fit = false;
     }
   });
   return fit;
@@ -291,23 +293,22 @@ bool fillConstants(BandBlocks& band, const std::vector<BlockState>& states) {
 
 }  // namespace
 
-std::optional<BandBlocks> signedBand(const SurfaceGeometry& surface, const BandOptions& options,
-                                     const Progress& progress) {
+std::optional<VoxelGrid<float>> signedBand(const SurfaceGeometry& surface, const BandOptions& options,
+                                           const Progress& progress) {
   if (!surface.manifold) return std::nullopt;
   require(surface.triangleCount() < std::size_t(std::numeric_limits<std::int32_t>::max()) / 8,
           "level set: the mesh has more triangles than can be numbered");
   const BrickLists lists(surface, options, progress);
-  BandBlocks band;
-  band.options = options;
-  band.bricks = lists.bricks();
-  band.table.assign(band.bricks.size(), BandBlocks::kOutside);
+  const BrickBox& box = lists.bricks();
+  VoxelGrid<float> band("level set", options.voxelSize, options.outsideValue());
+  Entries entries(box.size(), kOutside);
   std::vector<std::size_t> bricks;
-  for (std::size_t b = 0; b < band.table.size(); ++b)
+  for (std::size_t b = 0; b < entries.size(); ++b)
     if (!lists.isEmpty(b)) {
-      band.table[b] = std::int32_t(bricks.size());
+      entries[b] = std::int32_t(bricks.size());
       bricks.push_back(b);
+      band.add(box.at(b));
     }
-  resizeLarge(band.samples, bricks.size() * BandBlocks::kSamples);
   std::vector<BlockState> states(bricks.size());
   std::atomic<bool> contradiction{false};
   parallelFor(
@@ -315,75 +316,16 @@ std::optional<BandBlocks> signedBand(const SurfaceGeometry& surface, const BandO
       [&](std::size_t begin, std::size_t end) {
         std::vector<PlacedTriangle> placed;
         for (std::size_t i = begin; i < end && !contradiction; ++i) {
-          states[i] = workBrick(lists, surface, band, bricks[i], placed,
-                                band.samples.data() + i * BandBlocks::kSamples);
+          states[i] = workBrick(lists, surface, options, bricks[i], placed, band.samples(std::int32_t(i)));
           if (states[i] == BlockState::contradictory) contradiction = true;
         }
       },
       progress);
-  if (contradiction || !fillConstants(band, states)) return std::nullopt;
+  if (contradiction || !fillConstants(band, std::size_t(box.count.x), states, entries)) return std::nullopt;
+  for (std::size_t b = 0; b < entries.size(); ++b)
+    if (entries[b] == kInside || (entries[b] == kOutside && !lists.isEmpty(b)))
+      band.setConstant(box.at(b), entries[b] == kInside ? options.insideValue() : options.outsideValue());
   return band;
-}
-
-VdbGrid bandToVdb(const BandBlocks& band) {
-  initializeOpenVdb();
-  const float half = std::min(-band.outsideValue(), band.insideValue());
-  auto grid = openvdb::FloatGrid::create(half);
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(band.options.voxelSize));
-  const auto isActive = [half](float value) { return value > -half && value < half; };
-  assembleTree(grid->tree(), band.bricks.first, band.bricks.count,
-               [&](const Vec3i& position, const openvdb::Coord& origin) -> LeafOrTile {
-                 const std::int32_t entry = band.table[band.bricks.numberOf(position)];
-                 if (entry < 0) return {nullptr, entry == BandBlocks::kInside ? -half : half, false};
-                 const float* samples = band.samples.data() + std::size_t(entry) * BandBlocks::kSamples;
-                 float values[BandBlocks::kSamples];
-                 for (int z = 0; z < kBrick; ++z)
-                   for (int y = 0; y < kBrick; ++y)
-                     for (int x = 0; x < kBrick; ++x)
-                       values[(x * kBrick + y) * kBrick + z] =
-                           std::clamp(-samples[(z * kBrick + y) * kBrick + x], -half, half);
-                 return leafOf(values, origin, isActive);
-               });
-  return wrapGrid(grid);
-}
-
-std::shared_ptr<BrickGrid> bandToBricks(const BandBlocks& band) {
-  auto grid = std::make_shared<BrickGrid>();
-  const auto h = float(band.options.voxelSize);
-  grid->indexToWorld = {Mat3f::scaling(h), {}};
-  grid->worldToIndex = {Mat3f::scaling(1.0f / h), {}};
-  grid->voxelSize = h;
-  grid->background = band.outsideValue();
-  grid->firstBrick = band.bricks.first;
-  grid->brickCount = band.bricks.count;
-  // Pool: outside, inside, then the blocks that are used, in table order.
-  std::vector<std::int32_t> blocks;
-  grid->table.resize(band.table.size());
-  for (std::size_t i = 0; i < band.table.size(); ++i) {
-    const std::int32_t entry = band.table[i];
-    grid->table[i] = entry < 0 ? -1 - entry : std::int32_t(2 + blocks.size());
-    if (entry >= 0) blocks.push_back(entry);
-  }
-  resizeLarge(grid->values, (blocks.size() + 2) * std::size_t(BrickGrid::kVolume));
-  grid->ranges.resize(blocks.size() + 2);
-  for (const std::int32_t constant : {0, 1}) {
-    const float value = constant == 0 ? band.outsideValue() : band.insideValue();
-    std::fill_n(grid->brick(constant), BrickGrid::kVolume, value);
-    grid->ranges[std::size_t(constant)] = Interval::of(value);
-  }
-  constexpr int kWidth = BrickGrid::kWidth;
-  parallelFor(blocks.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const float* samples = band.samples.data() + std::size_t(blocks[i]) * BandBlocks::kSamples;
-      float* own = grid->brick(std::int32_t(i + 2)) + (kWidth + 1) * kWidth + 1;
-      for (int z = 0; z < kBrick; ++z)
-        for (int y = 0; y < kBrick; ++y)
-          std::copy_n(samples + (z * kBrick + y) * kBrick, kBrick, own + (z * kWidth + y) * kWidth);
-    }
-  });
-  fillBorders(*grid);
-  return grid;
 }
 
 }  // namespace nephele::detail

@@ -479,8 +479,9 @@ bool isDense(const Mesh& mesh, double voxelSize) {
 
 std::shared_ptr<BrickGrid> bandLevel(const Mesh& mesh, const detail::SurfaceGeometry& surface,
                                      const detail::BandOptions& options, const Progress& progress) {
-  if (const auto band = detail::signedBand(surface, options, progress)) return detail::bandToBricks(*band);
-  return toBricks(detail::meshToVdb(mesh, options, progress));
+  if (const auto band = detail::signedBand(surface, options, progress))
+    return toBricks(*band, Beside::constant);
+  return toBricks(detail::floodedBand(mesh, options, progress));
 }
 
 }  // namespace

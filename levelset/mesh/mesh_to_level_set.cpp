@@ -1,8 +1,8 @@
 // Mesh to narrow-band level set.
 //
 // The distance itself comes from signedBand (mesh_band.cpp). Where that finds that sheets of the
-// mesh overlap, so that the nearest sheet does not tell inside from outside, OpenVDB's meshToVolume takes
-// over: it floods from the outside and keeps the outer sheets.
+// mesh overlap, so that the nearest sheet does not tell inside from outside, floodedBand takes over, which
+// keeps the outer sheets.
 //
 // The enclosed volume of the result is compared with the mesh's: an open mesh, or one too thin for the voxel
 // size, loses its sign without any other sign of trouble. The volume sums a share per voxel that rises
@@ -12,14 +12,11 @@
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/MeshToVolume.h>
-#include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/mesh/mesh_band.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/parallel.h"
@@ -30,26 +27,6 @@ namespace {
 
 constexpr double kVolumeTolerance = 0.01;
 
-/// The mesh as OpenVDB asks for it, without a copy.
-class MeshAdapter {
- public:
-  MeshAdapter(const Mesh& mesh, double voxelSize) : mesh_(mesh), perVoxel_(1.0 / voxelSize) {}
-
-  std::size_t polygonCount() const { return mesh_.faceCount(); }
-  std::size_t pointCount() const { return mesh_.positions.size(); }
-  std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& position) const {
-    const Vec3d& p = mesh_.positions[mesh_.corners[3 * n + v]];
-    position = openvdb::Vec3d(p.x, p.y, p.z) * perVoxel_;
-  }
-
- private:
-  const Mesh& mesh_;
-  double perVoxel_;
-};
-
-using FloatTree = openvdb::FloatTree;
-
 /// The share of a voxel that is inside, by its signed distance in voxels, positive inside; 0 below -1, 1
 /// above 1.
 double insideShare(double u) {
@@ -57,7 +34,7 @@ double insideShare(double u) {
   return (4.0 * narrow - wide) / 3.0;
 }
 
-void checkVolume(const Mesh& mesh, const VdbGrid& grid, double voxelSize, const Progress& progress) {
+void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, double voxelSize, const Progress& progress) {
   const double meshVolume = signedVolume(mesh);
   const double gridVolume = enclosedVolume(grid);
   if (std::abs(gridVolume / meshVolume - 1.0) < kVolumeTolerance) return;
@@ -91,49 +68,29 @@ void checkMesh(const Mesh& mesh) {
 
 }  // namespace
 
-namespace detail {
-
-VdbGrid meshToVdb(const Mesh& mesh, const BandOptions& options, const Progress& progress) {
-  initializeOpenVdb();
-  const double h = options.voxelSize;
-  try {
-    Interrupter interrupter(progress);
-    const auto transform = openvdb::math::Transform::createLinearTransform(h);
-    auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, MeshAdapter(mesh, h),
-                                                                 *transform, float(options.exteriorVoxels),
-                                                                 float(options.interiorVoxels));
-    progress.check();
-    return wrapGrid(grid);
-  } catch (const openvdb::Exception& e) {
-    throw Error(fmt::format("level set: OpenVDB: {}", e.what()));
-  }
-}
-
-}  // namespace detail
-
-double enclosedVolume(const VdbGrid& levelSet) {
-  const openvdb::FloatGrid::ConstPtr grid = detail::floatGrid(levelSet);
-  const FloatTree& tree = grid->tree();
-  const double voxel = std::abs(double(determinant(detail::affineOf(*grid).linear)));
-  const double perVoxel = -1.0 / std::cbrt(voxel);
-  const openvdb::tree::LeafManager<const FloatTree> leaves(tree);
+double enclosedVolume(const VoxelGrid<float>& levelSet) {
+  const double voxel = std::abs(double(determinant(levelSet.lattice().indexToWorld.linear)));
+  const double perVoxel = 1.0 / std::cbrt(voxel);
+  std::vector<std::int32_t> sampled;
+  std::size_t constantInside = 0;
+  levelSet.forEachBrick([&](const Vec3i&, std::int32_t entry) {
+    if (entry >= 0)
+      sampled.push_back(entry);
+    else
+      constantInside += levelSet.constants()[std::size_t(-1 - entry)] > 0;
+  });
   // Fixed pieces, summed in order: the same sum at any thread count.
   constexpr std::size_t kPiece = 64;
-  std::vector<double> pieces((leaves.leafCount() + kPiece - 1) / kPiece);
-  parallelFor(leaves.leafCount(), kPiece, [&](std::size_t begin, std::size_t end) {
+  std::vector<double> pieces((sampled.size() + kPiece - 1) / kPiece);
+  parallelFor(sampled.size(), kPiece, [&](std::size_t begin, std::size_t end) {
     double sum = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      const float* values = leaves.leaf(i).buffer().data();
-      for (openvdb::Index k = 0; k < FloatTree::LeafNodeType::SIZE; ++k)
-        sum += insideShare(perVoxel * double(values[k]));
+      const float* values = levelSet.samples(sampled[i]);
+      for (int k = 0; k < kBrickSamples; ++k) sum += insideShare(perVoxel * double(values[k]));
     }
     pieces[begin / kPiece] = sum;
   });
-  double voxels = std::accumulate(pieces.begin(), pieces.end(), 0.0);
-  auto tiles = tree.cbeginValueAll();
-  tiles.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tiles; ++tiles)
-    if (*tiles < 0) voxels += double(tiles.getVoxelCount());
+  const double voxels = std::accumulate(pieces.begin(), pieces.end(), double(constantInside) * kBrickSamples);
   return voxels * voxel;
 }
 
@@ -151,7 +108,8 @@ double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& opti
   return std::min(bricks, table) * kBrickBytes + table * kTableBytes + 100.0 * double(mesh.corners.size());
 }
 
-VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options, const Progress& progress) {
+VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
+                                const Progress& progress) {
   const double h = options.voxelSize;
   require(std::isfinite(h) && h > 0, fmt::format("level set: the voxel size must be > 0, got {}", h));
   require(std::isfinite(options.halfWidthVoxels) && options.halfWidthVoxels >= 1,
@@ -161,12 +119,10 @@ VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options, c
   const detail::BandOptions bandOptions{h, options.halfWidthVoxels, options.halfWidthVoxels};
   const detail::SurfaceGeometry surface = detail::surfaceGeometry(mesh);
   require(surface.closed, "level set: the mesh is not closed, so that it has no inside; repair it first");
-  std::optional<detail::BandBlocks> band = detail::signedBand(surface, bandOptions, progress);
-  VdbGrid grid = band ? detail::bandToVdb(*band) : detail::meshToVdb(mesh, bandOptions, progress);
-  band.reset();
-  grid.impl().grid->setName("surface");
-  checkVolume(mesh, grid, h, progress);
-  return grid;
+  std::optional<VoxelGrid<float>> band = detail::signedBand(surface, bandOptions, progress);
+  if (!band) band = detail::floodedBand(mesh, bandOptions, progress);
+  checkVolume(mesh, *band, h, progress);
+  return *std::move(band);
 }
 
 }  // namespace nephele

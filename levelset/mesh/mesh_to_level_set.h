@@ -1,10 +1,8 @@
 #pragma once
 
-#include <memory>
-
-#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/modeling/base/mesh.h"
-#include "nephele/modeling/field/field.h"
+#include "nephele/modeling/base/progress.h"
 
 namespace nephele {
 
@@ -15,19 +13,20 @@ struct MeshToLevelSetOptions {
   double halfWidthVoxels = 3.0;
 };
 
-/// Signed distance to a closed, outward-oriented triangle mesh in a narrow band: the file form.
+/// Signed distance to a closed, outward-oriented triangle mesh in a narrow band, positive inside.
 /// Exact to float rounding where the sheets of the mesh do not overlap; else OpenVDB's union of them, with a
 /// note.
 /// @throws Error if the mesh is not closed, or if the grid's volume differs from the mesh's by 1 % or more
 /// (where that is defined), naming both and a voxel size to try; Cancelled.
-VdbGrid meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
-                       const Progress& progress = silent());
+VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
+                                const Progress& progress = silent());
 
 /// Memory that `meshToLevelSet` will need at its peak, estimated from the area of the mesh: within a factor
 /// of two.
 double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options);
 
-/// Volume enclosed by the zero surface of a level set, world units cubed.
-double enclosedVolume(const VdbGrid& levelSet);
+/// Volume enclosed by the zero surface of a level set, world units cubed; its values must be distances near
+/// the surface, or grow in proportion to them. Second order in the size of voxels.
+double enclosedVolume(const VoxelGrid<float>& levelSet);
 
 }  // namespace nephele

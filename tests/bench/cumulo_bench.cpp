@@ -7,6 +7,7 @@
 #include "nephele/levelset/cloud/layers_on_grids.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/shape/shapes.h"
@@ -103,10 +104,10 @@ void cloudOfResolution(benchmark::State& state) {
   std::uint64_t voxels = 0;
   for (auto _ : state) {
     const GriddedCumulo cloud = griddedCumulo(base, layers, {.voxelSize = voxel, .box = kTorusBox});
-    const VdbGrid density =
+    VoxelGrid<float> density =
         cloudDensity(cloud, {.voxelSize = voxel, .edgeThickness = 0.0035f * kLongestSide});
     state.PauseTiming();
-    voxels = describe(density).activeVoxels;
+    voxels = describe(toVdb(std::move(density), {"density", VdbGridInfo::Class::fogVolume})).activeVoxels;
     state.ResumeTiming();
   }
   state.SetItemsProcessed(std::int64_t(voxels) * state.iterations());

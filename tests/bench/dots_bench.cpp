@@ -12,6 +12,7 @@
 
 #include "nephele/levelset/cloud/dot_volume.h"
 #include "nephele/levelset/cloud/wisp_volume.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/random_stream.h"
 
@@ -66,7 +67,7 @@ void wispsToGrids(benchmark::State& state) {
   const std::vector<WispGuide> guides(4, guide);
   for (auto _ : state) {
     const DotVolume volume = bakeWisps(guides, {.wisps = {.dots = kDots / 4}, .dots = {.voxelSize = kVoxel}});
-    benchmark::DoNotOptimize(volume.toVdb());
+    benchmark::DoNotOptimize(toVdb(volume.densityGrid(), {"density", VdbGridInfo::Class::fogVolume}));
   }
   state.SetItemsProcessed(state.iterations() * std::int64_t(kDots));
 }

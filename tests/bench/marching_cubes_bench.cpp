@@ -1,11 +1,13 @@
 // Marching cubes beside OpenVDB's mesher on the same grids; items are the cells that the surface crosses.
 #include <benchmark/benchmark.h>
+#include <openvdb/tools/VolumeToMesh.h>
 
 #include <cmath>
 #include <map>
 #include <memory>
 
 #include "nephele/levelset/grid/bake.h"
+#include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/field/operations.h"
@@ -41,8 +43,7 @@ using MakeGrid = std::shared_ptr<BrickGrid> (*)(int);
 
 // OpenVDB's mesher, unless it adapts, makes one vertex in every cell that the surface crosses.
 std::size_t surfaceCells(const BrickGrid& grid) {
-  const VdbGrid vdb = toVdb(grid, {.name = "surface", .gridClass = VdbGridInfo::Class::levelSet});
-  return adaptiveMesh(vdb, 0, 0).positions.size();
+  return adaptiveMesh(grid, 0, 0).positions.size();
 }
 
 void report(benchmark::State& state, const BrickGrid& grid, std::size_t faces) {
@@ -61,9 +62,16 @@ void marchingCubesOf(benchmark::State& state, MakeGrid make) {
 
 void openVdbOf(benchmark::State& state, MakeGrid make) {
   const auto grid = make(int(state.range(0)));
-  const VdbGrid vdb = toVdb(*grid, {.name = "surface", .gridClass = VdbGridInfo::Class::levelSet});
+  const auto vdb = detail::toOpenVdb(*grid, detail::TreeValues::levelSet(*grid, "surface"), "surface");
+  vdb->setGridClass(openvdb::GRID_LEVEL_SET);
   std::size_t faces = 0;
-  for (auto _ : state) faces = adaptiveMesh(vdb, 0, 0).faceCount();
+  for (auto _ : state) {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles;
+    std::vector<openvdb::Vec4I> quads;
+    openvdb::tools::volumeToMesh(*vdb, points, triangles, quads, 0, 0);
+    faces = triangles.size() + quads.size();
+  }
   report(state, *grid, faces);
 }
 

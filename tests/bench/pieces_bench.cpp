@@ -53,7 +53,7 @@ const ScalarField& level() {
 
 void levelSet(benchmark::State& state) {
   for (auto _ : state)
-    benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl());
+    benchmark::DoNotOptimize(meshToLevelSet(source(), {.voxelSize = double(voxel())}).sampledBricks());
 }
 
 PieceLattice lattice() {
@@ -169,8 +169,9 @@ void splitAgainstLevelSet(benchmark::State& state) {
   for (auto _ : state) {
     // Of all processors together, which other programs do not change much.
     const std::clock_t start = std::clock();
-    const double made = secondsOf(
-        [&] { benchmark::DoNotOptimize(&meshToLevelSet(source(), {.voxelSize = double(voxel())}).impl()); });
+    const double made = secondsOf([&] {
+      benchmark::DoNotOptimize(meshToLevelSet(source(), {.voxelSize = double(voxel())}).sampledBricks());
+    });
     const std::clock_t between = std::clock();
     Pieces cut;
     const double split = secondsOf([&] {

@@ -2,12 +2,12 @@
 
 // OpenVDB stays behind this header: only .cpp files of this folder include it.
 #include <openvdb/openvdb.h>
-#include <openvdb/util/NullInterrupter.h>
 
 #include <functional>
-#include <mutex>
 #include <string>
+#include <vector>
 
+#include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 
@@ -23,20 +23,11 @@ inline VdbGrid wrapGrid(openvdb::GridBase::Ptr grid) {
   return VdbGrid(std::make_shared<VdbGrid::Impl>(VdbGrid::Impl{std::move(grid)}));
 }
 
-/// OpenVDB's type registry must be filled before any grid is made or read.
-inline void initializeOpenVdb() {
-  static std::once_flag once;
-  std::call_once(once, [] { openvdb::initialize(); });
-}
-
 /// The grid as float values. @throws Error naming the grid and its type if it is not a float grid.
 openvdb::FloatGrid::ConstPtr floatGrid(const VdbGrid& grid);
 
 /// A double grid as float, a float grid as it is, null for any other type.
 openvdb::FloatGrid::Ptr toFloatGrid(const openvdb::GridBase::Ptr& grid);
-
-/// Linear map of a transform. @throws Error naming the grid if its transform is not linear or is singular.
-Affine affineOf(const openvdb::GridBase& grid);
 
 /// Whether the values of a grid of a file are wanted, by its type and name.
 using WantedGrid = std::function<bool(const openvdb::GridBase& type, const std::string& name)>;
@@ -47,19 +38,6 @@ std::vector<openvdb::GridBase::Ptr> readOpenVdb(const std::string& path, const W
 
 /// Every grid of a NanoVDB file. @throws std::exception, Error; the caller adds the path.
 std::vector<openvdb::GridBase::Ptr> readNanoVdb(const std::string& path);
-
-/// Lets OpenVDB's tools see that a Progress was cancelled, and reports how far they are.
-class Interrupter final : public openvdb::util::NullInterrupter {
- public:
-  explicit Interrupter(const Progress& progress) : progress_(progress) {}
-  bool wasInterrupted(int percent = -1) override {
-    if (percent >= 0) progress_.advance(percent / 100.0);
-    return progress_.cancelled();
-  }
-
- private:
-  const Progress& progress_;
-};
 
 }  // namespace detail
 }  // namespace nephele

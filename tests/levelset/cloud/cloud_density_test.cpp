@@ -98,8 +98,8 @@ TEST(CloudDensity, IsMultipliedByTheFactorEverywhere) {
 TEST(CloudDensity, KeepsTilesWhereTheFactorIsOneNumber) {
   const GriddedCumulo cloud = ball(0, 0.04f);
   const auto voxels = [&](const ScalarField& factor) {
-    return describe(cloudDensity(cloud, {.voxelSize = kVoxel / 2, .edgeThickness = 0.04f, .factor = factor}))
-        .memoryBytes;
+    return cloudDensity(cloud, {.voxelSize = kVoxel / 2, .edgeThickness = 0.04f, .factor = factor})
+        .memoryBytes();
   };
   const auto plain = voxels(1.0f);
   // A constant costs nothing; half of the cloud cut away costs less than the whole.

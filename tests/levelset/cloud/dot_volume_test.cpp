@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "nephele/levelset/io/vdb_io.h"
+
 namespace nephele::test {
 namespace {
 
@@ -190,14 +192,11 @@ TEST(DotVolume, ColourIsTheMeanByMass) {
   EXPECT_EQ(volume.density({0, 0, 0}), 4);
   EXPECT_EQ(volume.color({0, 0, 0}), (Vec3f{0.25f, 0.75f, 0.375f}));
   EXPECT_EQ(volume.color({5, 0, 0}), Vec3f{});
-  const std::vector<VdbGrid> grids = volume.toVdb();
-  ASSERT_EQ(grids.size(), 2u);
-  EXPECT_EQ(describe(grids[1]).name, "Cd");
-  const auto parts = vectorComponents(grids[1]);
-  EXPECT_FLOAT_EQ(toBricks(parts[1])->at({0, 0, 0}), 0.75f);
+  const VoxelGrid<Vec3f> grid = volume.colorGrid();
+  EXPECT_FLOAT_EQ(grid.at({0, 0, 0}).y, 0.75f);
   // Beside it, in the same brick, there is colour to interpolate with.
-  EXPECT_FLOAT_EQ(toBricks(parts[1])->at({1, 0, 0}), 0.75f);
-  EXPECT_EQ(toBricks(parts[1])->at({-1, 0, 0}), 0);
+  EXPECT_FLOAT_EQ(grid.at({1, 0, 0}).y, 0.75f);
+  EXPECT_EQ(grid.at({-1, 0, 0}), Vec3f{});
 }
 
 TEST(DotVolume, ColourDoesNotChangeTheDensity) {
@@ -205,7 +204,7 @@ TEST(DotVolume, ColourDoesNotChangeTheDensity) {
   DotVolume with({.voxelSize = 0.1f, .withColor = true}), without({.voxelSize = 0.1f});
   with.add(dots);
   without.add(dots);
-  EXPECT_EQ(toBricks(with.toVdb()[0])->values, toBricks(without.toVdb()[0])->values);
+  EXPECT_EQ(toBricks(with.densityGrid())->values, toBricks(without.densityGrid())->values);
 }
 
 TEST(DotVolume, IsTheSameAtAnyThreadCountAndInAnyParts) {
@@ -217,8 +216,8 @@ TEST(DotVolume, IsTheSameAtAnyThreadCountAndInAnyParts) {
     DotVolume volume(options);
     for (std::size_t i = 0; i < dots.size(); i += part)
       volume.add(DotSpans(dots).part(i, std::min(part, dots.size() - i)));
-    const std::vector<VdbGrid> grids = volume.toVdb();
-    return std::pair(toBricks(grids[0])->values, toBricks(vectorComponents(grids[1])[2])->values);
+    const auto blue = vectorComponents(toVdb(volume.colorGrid(), {"Cd"}))[2];
+    return std::pair(toBricks(volume.densityGrid())->values, toBricks(blue)->values);
   };
   const auto one = grown(1, dots.size());
   EXPECT_EQ(one, grown(4, dots.size()));
@@ -229,15 +228,14 @@ TEST(DotVolume, WritesFogOfTheSameValues) {
   const Dots dots = randomDots(500, 6);
   DotVolume volume({.voxelSize = 0.1f});
   volume.add(dots);
-  const std::vector<VdbGrid> grids = volume.toVdb("smoke", true);
-  ASSERT_EQ(grids.size(), 1u);
-  const VdbGridInfo info = describe(grids[0]);
+  const VdbGrid grid = toVdb(volume.densityGrid(), {"smoke", VdbGridInfo::Class::fogVolume, true});
+  const VdbGridInfo info = describe(grid);
   EXPECT_EQ(info.name, "smoke");
   EXPECT_EQ(info.gridClass, VdbGridInfo::Class::fogVolume);
   EXPECT_TRUE(info.halfFloat);
   EXPECT_EQ(info.background, 0);
   EXPECT_FLOAT_EQ(info.voxelSize.y, 0.1f);
-  const auto bricks = toBricks(grids[0]);
+  const auto bricks = toBricks(grid);
   int active = 0;
   for (int x = -40; x <= 40; ++x)
     for (int y = -40; y <= 40; ++y)
@@ -252,7 +250,8 @@ TEST(DotVolume, NothingAddedIsAnEmptyGrid) {
   DotVolume volume({.voxelSize = 1, .withColor = true});
   volume.add(Dots{});
   EXPECT_EQ(volume.brickCount(), 0u);
-  for (const VdbGrid& grid : volume.toVdb()) EXPECT_EQ(describe(grid).activeVoxels, 0u);
+  EXPECT_EQ(describe(toVdb(volume.densityGrid(), {"density"})).activeVoxels, 0u);
+  EXPECT_EQ(describe(toVdb(volume.colorGrid(), {"Cd"})).activeVoxels, 0u);
 }
 
 TEST(DotVolume, FarApartDotsCostTheTableBetweenThemOnly) {

@@ -28,6 +28,10 @@ std::string errorOf(const std::function<void()>& work) {
   return "no error";
 }
 
+VdbGrid ballGrid(double voxelSize) {
+  return toVdb(meshToLevelSet(icosphere(1.0, 4), {.voxelSize = voxelSize}), {"surface", Class::levelSet});
+}
+
 /// A grid of 3 x 3 x 3 bricks: ramp in the middle brick, the constant `inner` in the one after it along x,
 /// `outer` in the others.
 BrickGrid smallGrid(float outer, float inner) {
@@ -111,7 +115,7 @@ TEST(VdbIo, FogIsNeverNegativeInFiles) {
 }
 
 TEST(VdbIo, LevelSetInteriorIsAnInactiveTileOfTheOtherSign) {
-  const VdbGrid grid = meshToLevelSet(icosphere(1.0, 4), {.voxelSize = 0.02});
+  const VdbGrid grid = ballGrid(0.02);
   const auto bricks = toBricks(grid);
   EXPECT_FLOAT_EQ(bricks->at({0, 0, 0}), 0.06f);
   EXPECT_FLOAT_EQ(bricks->at({100, 0, 0}), -0.06f);
@@ -360,7 +364,7 @@ TEST(VdbIo, BadFilesNameThemselvesAndWhatIsWrong) {
 
 TEST(VdbIo, FilesCutAnywhereAreRefused) {
   const TemporaryFolder folder;
-  writeVdbFile(folder.file("whole.vdb"), {meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.1})}, {});
+  writeVdbFile(folder.file("whole.vdb"), {ballGrid(0.1)}, {});
   const std::string whole = textOf(folder.file("whole.vdb"));
   for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 97) {
     std::ofstream(folder.file("cut.vdb"), std::ios::binary) << whole.substr(0, length);
@@ -373,7 +377,7 @@ TEST(VdbIo, FilesCutAnywhereAreRefused) {
 TEST(VdbIo, DamagedBytesAreAnErrorOrOtherValuesButNothingWorse) {
   // OpenVDB 10.0.1 by itself writes past its buffers on many such files.
   const TemporaryFolder folder;
-  writeVdbFile(folder.file("whole.vdb"), {meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.1})}, {});
+  writeVdbFile(folder.file("whole.vdb"), {ballGrid(0.1)}, {});
   const std::string whole = textOf(folder.file("whole.vdb"));
   // From the transform on: what stands before are names and numbers, whose lengths OpenVDB allocates as they
   // are.
@@ -410,7 +414,7 @@ TEST(VdbIo, NanoVdbFilesCutAnywhereAreRefused) {
 TEST(VdbIo, AFullDiskLeavesAnErrorAndNoFile) {
   // A limit on file size stands in for a full disk: writes beyond it fail.
   const TemporaryFolder folder;
-  const VdbGrid grid = meshToLevelSet(icosphere(1.0, 4), {.voxelSize = 0.03});
+  const VdbGrid grid = ballGrid(0.03);
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   const auto oldHandler = std::signal(SIGXFSZ, SIG_IGN);

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
@@ -131,8 +132,7 @@ TEST_P(MarchingCubesOnMeshes, KeepTopologyAndPlace) {
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const Mesh source = triangulated(readMesh(path));
   const double voxelSize = double(boundingBox(source).longestSide()) / GetParam().resolution;
-  const VdbGrid levelSet = meshToLevelSet(source, {.voxelSize = voxelSize});
-  const Mesh mesh = marchingCubes(*toBricks(levelSet));
+  const Mesh mesh = marchingCubes(*toBricks(meshToLevelSet(source, {.voxelSize = voxelSize})));
 
   EXPECT_TRUE(topologyOf(mesh).isClosedManifold()) << topologyOf(mesh);
   const Topology topology = topologyOf(withoutIslands(mesh, std::pow(voxelSize, 3)));
@@ -174,10 +174,10 @@ TEST(AdaptiveMesh, ShowsTheSurfaceOfMarchingCubes) {
   const std::string path = test::sharedData("meshes/torus_genus1.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
   const double voxelSize = 0.03;
-  const VdbGrid levelSet = meshToLevelSet(triangulated(readMesh(path)), {.voxelSize = voxelSize});
+  const auto levelSet = toBricks(meshToLevelSet(triangulated(readMesh(path)), {.voxelSize = voxelSize}));
   for (const double isovalue : {-0.04, 0.0, 0.04}) {
-    const Mesh cubes = marchingCubes(*toBricks(levelSet), float(isovalue));
-    const Mesh dual = adaptiveMesh(levelSet, isovalue, 0);
+    const Mesh cubes = marchingCubes(*levelSet, float(isovalue));
+    const Mesh dual = adaptiveMesh(*levelSet, isovalue, 0);
     EXPECT_TRUE(topologyOf(dual).isClosedManifold()) << topologyOf(dual);
     EXPECT_EQ(topologyOf(dual).eulerCharacteristic, 0);
     EXPECT_GT(signedVolume(dual), 0);
@@ -188,9 +188,9 @@ TEST(AdaptiveMesh, ShowsTheSurfaceOfMarchingCubes) {
 TEST(AdaptiveMesh, HasFewerFacesWithMoreAdaptivity) {
   const std::string path = test::sharedData("meshes/rocker_arm_genus1.obj");
   NEPHELE_REQUIRE_SHARED_DATA(path);
-  const VdbGrid levelSet = meshToLevelSet(triangulated(readMesh(path)), {.voxelSize = 0.005});
-  const Mesh fine = adaptiveMesh(levelSet, 0, 0);
-  const Mesh coarse = adaptiveMesh(levelSet, 0, 0.5);
+  const auto levelSet = toBricks(meshToLevelSet(triangulated(readMesh(path)), {.voxelSize = 0.005}));
+  const Mesh fine = adaptiveMesh(*levelSet, 0, 0);
+  const Mesh coarse = adaptiveMesh(*levelSet, 0, 0.5);
   EXPECT_LT(2 * coarse.faceCount(), fine.faceCount());
   EXPECT_NEAR(signedVolume(coarse) / signedVolume(fine), 1, 0.01);
 }
@@ -198,9 +198,9 @@ TEST(AdaptiveMesh, HasFewerFacesWithMoreAdaptivity) {
 TEST(AdaptiveMesh, TakesDensitiesAsInsideWhereTheyAreHigh) {
   const std::string path = test::sharedData("volumes/dragon_small_fog.vdb");
   NEPHELE_REQUIRE_SHARED_DATA(path);
-  const VdbGrid fog = readScalarGrid(path);
-  const Mesh dual = adaptiveMesh(fog, 0.5, 0);
-  const Mesh cubes = marchingCubes(*toBricks(fog), 0.5f);
+  const auto fog = toBricks(readScalarGrid(path));
+  const Mesh dual = adaptiveMesh(*fog, 0.5, 0);
+  const Mesh cubes = marchingCubes(*fog, 0.5f);
   EXPECT_TRUE(topologyOf(cubes).isClosedManifold()) << topologyOf(cubes);
   EXPECT_GT(signedVolume(dual), 0);
   EXPECT_GT(signedVolume(cubes), 0);
@@ -211,10 +211,10 @@ TEST(AdaptiveMesh, TakesDensitiesAsInsideWhereTheyAreHigh) {
 TEST(AdaptiveMesh, RefusesBadArguments) {
   const std::string path = test::sharedData("volumes/dragon_small_fog.vdb");
   NEPHELE_REQUIRE_SHARED_DATA(path);
-  const VdbGrid fog = readScalarGrid(path);
+  const auto fog = toBricks(readScalarGrid(path));
   for (const double adaptivity : {-0.1, 1.1, std::nan("")})
-    EXPECT_THROW(adaptiveMesh(fog, 0.5, adaptivity), Error);
-  EXPECT_THROW(adaptiveMesh(fog, std::nan(""), 0), Error);
+    EXPECT_THROW(adaptiveMesh(*fog, 0.5, adaptivity), Error);
+  EXPECT_THROW(adaptiveMesh(*fog, std::nan(""), 0), Error);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_band.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/triangle_kernels.h"
@@ -67,17 +68,18 @@ TEST(MeshToLevelSet, MatchesTheDistanceOfATorus) {
 
 TEST(MeshToLevelSet, EnclosesTheVolumeOfTheMesh) {
   // 4/3 pi, and 2 pi^2 R r^2; the bar is 1 %. The inscribed meshes hold 0.1 % and 0.05 % less.
-  const VdbGrid sphere = meshToLevelSet(icosphere(1.0, 5), {.voxelSize = 0.05});
+  const auto sphere = meshToLevelSet(icosphere(1.0, 5), {.voxelSize = 0.05});
   EXPECT_NEAR(enclosedVolume(sphere) / (4.0 / 3.0 * M_PI), 1.0, 2e-3);
-  const VdbGrid torus = meshToLevelSet(torusMesh(1.0, 0.4, 256, 128), {.voxelSize = 0.03});
+  const auto torus = meshToLevelSet(torusMesh(1.0, 0.4, 256, 128), {.voxelSize = 0.03});
   EXPECT_NEAR(enclosedVolume(torus) / (2 * M_PI * M_PI * 0.16), 1.0, 3e-3);
 }
 
 TEST(MeshToLevelSet, ActiveVoxelsAreTheBand) {
   // A slab of 2 w voxels about the sphere: volume of the shell over h^3.
   for (const double width : {1.0, 3.0, 6.5}) {
-    const VdbGrid grid = meshToLevelSet(icosphere(1.0, 5), {.voxelSize = 0.05, .halfWidthVoxels = width});
-    const VdbGridInfo info = describe(grid);
+    const VdbGridInfo info =
+        describe(toVdb(meshToLevelSet(icosphere(1.0, 5), {.voxelSize = 0.05, .halfWidthVoxels = width}),
+                       {"surface", VdbGridInfo::Class::levelSet}));
     const double half = width * 0.05;
     const double shell = 4.0 / 3.0 * M_PI * (std::pow(1 + half, 3) - std::pow(1 - half, 3));
     EXPECT_NEAR(double(info.activeVoxels) / (shell / std::pow(0.05, 3)), 1.0, 0.01) << width;
@@ -105,7 +107,7 @@ TEST(MeshToLevelSet, CavitiesAreOutside) {
   Mesh inner = icosphere(0.5, 4);
   for (std::size_t f = 0; f < inner.faceCount(); ++f)
     std::swap(inner.corners[3 * f], inner.corners[3 * f + 1]);
-  const VdbGrid grid = meshToLevelSet(joined(icosphere(1.0, 4), inner), {.voxelSize = 0.04});
+  const auto grid = meshToLevelSet(joined(icosphere(1.0, 4), inner), {.voxelSize = 0.04});
   EXPECT_NEAR(enclosedVolume(grid), 4.0 / 3.0 * M_PI * (1 - 0.125), 0.02);
   EXPECT_LT(toBricks(grid)->at({0, 0, 0}), 0.0f);
 }
@@ -122,7 +124,7 @@ TEST(MeshToLevelSet, OverlappingPartsBecomeTheirUnion) {
   // Two unit spheres, centres 1 apart: 2 * 4/3 pi - lens, lens = pi (4 + d) (2 - d)^2 / 12 = 5 pi / 12.
   const Mesh mesh = joined(icosphere(1.0, 4), icosphere(1.0, 4, {1.0, 0.013, 0.007}));
   EXPECT_FALSE(detail::signedBand(detail::surfaceGeometry(mesh), {.voxelSize = 0.05}, silent()).has_value());
-  const VdbGrid grid = meshToLevelSet(mesh, {.voxelSize = 0.05});
+  const auto grid = meshToLevelSet(mesh, {.voxelSize = 0.05});
   EXPECT_NEAR(enclosedVolume(grid), 8.0 / 3.0 * M_PI - 5.0 * M_PI / 12.0, 0.05);
 }
 
@@ -145,8 +147,8 @@ TEST(MeshToLevelSet, SignAgreesWithOpenVdbAwayFromTheSurface) {
   const detail::BandOptions options{.voxelSize = boundingBox(mesh).longestSide() / 128.0};
   const auto band = detail::signedBand(detail::surfaceGeometry(mesh), options, silent());
   ASSERT_TRUE(band.has_value());
-  const auto ours = detail::bandToBricks(*band);
-  const auto theirs = toBricks(detail::meshToVdb(mesh, options, silent()));
+  const auto ours = toBricks(*band, Beside::constant);
+  const auto theirs = toBricks(detail::floodedBand(mesh, options, silent()));
   std::size_t compared = 0, different = 0;
   for (int z = -8; z < 8 * ours->brickCount.z; ++z)
     for (int y = 0; y < 8 * ours->brickCount.y; y += 3)
@@ -217,13 +219,11 @@ TEST(MeshToLevelSet, StopsWhenCancelled) {
 }
 
 TEST(MeshToLevelSet, EstimatesItsMemoryWithinAFactorOfThree) {
-  // Peak of this case, blocks and leaves: about 1.1 kB of samples per 8^3 block and side; measured from the
-  // band itself.
+  // The band itself, and as much beside it while it is made.
   const Mesh mesh = icosphere(1.0, 5);
   const MeshToLevelSetOptions options{.voxelSize = 0.01};
   const auto band = detail::signedBand(detail::surfaceGeometry(mesh), {.voxelSize = 0.01}, silent());
-  const double held =
-      double(band->samples.size()) * sizeof(float) + double(describe(detail::bandToVdb(*band)).memoryBytes);
+  const double held = 2 * double(band->memoryBytes());
   const double estimate = estimateLevelSetBytes(mesh, options);
   EXPECT_GT(estimate, held);
   EXPECT_LT(estimate, 3 * held);
