@@ -30,26 +30,27 @@ Vec3d rounded(const Vec3d& p, double perUnit) {
 
 BrickGrid sampled(const Shape& shape, const Vec3d& low, const Vec3d& high, double voxelSize) {
   BrickGrid grid;
-  grid.indexToWorld.linear = Mat3f::scaling(float(voxelSize));
-  grid.voxelSize = float(voxelSize);
-  grid.background = -1;
+  grid.indexToWorld().linear = Mat3f::scaling(float(voxelSize));
+  grid.voxelSize() = float(voxelSize);
+  grid.background() = -1;
   const double brickSize = voxelSize * BrickGrid::kBrick;
   for (int axis = 0; axis < 3; ++axis) {
-    grid.firstBrick[axis] = int(std::floor(low[axis] / brickSize));
-    grid.brickCount[axis] = int(std::floor(high[axis] / brickSize)) + 1 - grid.firstBrick[axis];
+    grid.firstBrick()[axis] = int(std::floor(low[axis] / brickSize));
+    grid.brickCount()[axis] = int(std::floor(high[axis] / brickSize)) + 1 - grid.firstBrick()[axis];
   }
-  grid.values.assign(BrickGrid::kVolume, grid.background);
-  grid.ranges.push_back({grid.background, grid.background});
-  for (int z = 0; z < grid.brickCount.z; ++z) {
-    for (int y = 0; y < grid.brickCount.y; ++y) {
-      for (int x = 0; x < grid.brickCount.x; ++x) {
-        const Vec3i origin = (grid.firstBrick + Vec3i{x, y, z}) * BrickGrid::kBrick;
-        grid.table.push_back(std::int32_t(grid.poolSize()));
-        grid.ranges.push_back({-1e30f, 1e30f});
+  grid.values().assign(BrickGrid::kVolume, grid.background());
+  grid.ranges().push_back({grid.background(), grid.background()});
+  for (int z = 0; z < grid.brickCount().z; ++z) {
+    for (int y = 0; y < grid.brickCount().y; ++y) {
+      for (int x = 0; x < grid.brickCount().x; ++x) {
+        const Vec3i origin = (grid.firstBrick() + Vec3i{x, y, z}) * BrickGrid::kBrick;
+        grid.table().push_back(std::int32_t(grid.poolSize()));
+        grid.ranges().push_back({-1e30f, 1e30f});
         for (int k = -1; k < 10; ++k) {
           for (int j = -1; j < 10; ++j) {
             for (int i = -1; i < 10; ++i) {
-              grid.values.push_back(float(shape(Vec3d(origin + Vec3i{i, j, k}) * double(float(voxelSize)))));
+              grid.values().push_back(
+                  float(shape(Vec3d(origin + Vec3i{i, j, k}) * double(float(voxelSize)))));
             }
           }
         }

@@ -64,7 +64,7 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
   }
   result.voxelSize = a.voxelSize.value > 0 ? a.voxelSize.worldUnits(side) : side / a.resolution;
   if (a.voxelSize.value == 0 && a.resolutionOption->count() == 0 && parts[0].level)
-    result.voxelSize = double(parts[0].level->voxelSize);
+    result.voxelSize = double(parts[0].level->voxelSize());
   return result;
 }
 

@@ -103,9 +103,9 @@ ScalarField FieldSources::mask(const FieldValue& value) {
   const VdbGridInfo info = describe(grid);
   const auto bricks = toBricks(grid);
   const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
-  const Box active = activeBox(info, bricks->indexToWorld), common = active.intersection(box_);
+  const Box active = activeBox(info, bricks->indexToWorld()), common = active.intersection(box_);
   const std::string outside = fmt::format("; outside its grid it counts as {:g}",
-                                          isLevelSet ? 0.0 : std::clamp(bricks->background, 0.0f, 1.0f));
+                                          isLevelSet ? 0.0 : std::clamp(bricks->background(), 0.0f, 1.0f));
   if (common.isEmpty())
     run_.note(fmt::format(
         "warning: {}: mask {}: grid '{}' has no active voxel near the shape: it holds {}, the shape {}{}",
@@ -115,7 +115,7 @@ ScalarField FieldSources::mask(const FieldValue& value) {
     run_.note(fmt::format("{}: mask {}: the active voxels of grid '{}' span {:.0f} % of the shape's box{}",
                           value.option, value.path, info.name, 100 * share, outside));
   const ScalarField field = gridField(bricks);
-  return isLevelSet ? smoothstep(-bricks->voxelSize, bricks->voxelSize, field) : field;
+  return isLevelSet ? smoothstep(-bricks->voxelSize(), bricks->voxelSize(), field) : field;
 }
 
 ScalarField FieldSources::attribute(const FieldValue& value) {

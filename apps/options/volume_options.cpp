@@ -43,12 +43,7 @@ VolumePart::Grids readThree(const std::string& path, const std::string& grid, do
   const std::array<VdbGrid, 3> parts = readVectorGrid(path, grid);
   for (std::size_t c = 0; c != 3; ++c) {
     const auto bricks = toBricks(parts[c]);
-    if (scale != 1) {
-      const auto factor = float(scale);
-      for (float& value : bricks->values) value *= factor;
-      for (Interval& range : bricks->ranges) range = {range.min * factor, range.max * factor};
-      bricks->background *= factor;
-    }
+    if (scale != 1) bricks->multiply(float(scale));
     result[c] = bricks;
   }
   return result;

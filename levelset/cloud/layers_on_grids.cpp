@@ -98,7 +98,7 @@ class LayerSampler {
     const auto start = std::chrono::steady_clock::now();
     progress_.begin("layer " + std::to_string(step.index + 1));
     const float voxel = cumuloVoxelSize(layers_, step.index, options_.voxelSize);
-    const std::shared_ptr<BrickGrid> grid = bakeLayer(step, voxel);
+    const std::shared_ptr<PackedGrid> grid = bakeLayer(step, voxel);
 
     const ScalarField displacement = gridField(grid, Interpolation::tricubic);
     CumuloSampled sampled{displacement, step.before + abs(displacement), 0.0f, 0.0f};
@@ -116,11 +116,11 @@ class LayerSampler {
   /// The layer's grid, packed. A large one is made in parts along z, since samples take more memory until
   /// they are packed. A part is smoothed together with as much of its neighbours as can reach it: the parts
   /// do not show.
-  std::shared_ptr<BrickGrid> bakeLayer(const CumuloStep& step, float voxel) {
+  std::shared_ptr<PackedGrid> bakeLayer(const CumuloStep& step, float voxel) {
     const Box box = options_.box.expanded(reach_ + step.margin);
     const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
     const LayerParts cut = detail::partsOf(box, voxel, smoothing.dilation + smoothing.steps);
-    const std::shared_ptr<BrickGrid> layer = detail::emptyPackedGrid(detail::noSamples(box, voxel, cut.all));
+    const std::shared_ptr<PackedGrid> layer = detail::emptyPackedGrid(detail::noSamples(box, voxel, cut.all));
     const ScalarField needed = detail::neededDisplacement(step, layers_, options_.voxelSize);
     const int count = cut.count();
     std::deque<LayerPart> parts;
@@ -176,8 +176,8 @@ class LayerSampler {
   }
 
   /// l_i for the next layer to find its surface points on; after the last layer the estimate of the result.
-  void prepareNext(const CumuloStep& step, const std::shared_ptr<BrickGrid>& grid, CumuloSampled& sampled) {
-    const float voxel = grid->voxelSize;
+  void prepareNext(const CumuloStep& step, const std::shared_ptr<PackedGrid>& grid, CumuloSampled& sampled) {
+    const float voxel = grid->voxelSize();
     if (step.index + 1 == layers_.size()) {
       estimate = (level_ ? withRangesOf(*level_, step.before) : step.before) + abs(gridField(grid));
       estimateVoxelSize = voxel;
@@ -325,7 +325,7 @@ class LayerSampler {
   const Progress& progress_;
   float reach_;
   /// The sampled l_i that the next layer reads, if there is one.
-  std::shared_ptr<BrickGrid> level_;
+  std::shared_ptr<PackedGrid> level_;
 };
 
 }  // namespace

@@ -73,7 +73,7 @@ CurvedKnives curvedKnives(const Knives& knives, float kerf, const BrickGrid& lev
   curved.planes.clear();
   const Box box = level.worldBox();
   std::vector<LatticeKnife> given;
-  for (const Knife& knife : asFields(curved, double(level.voxelSize), kerf, progress))
+  for (const Knife& knife : asFields(curved, double(level.voxelSize()), kerf, progress))
     given.push_back({knife});
   for (std::size_t i = 0; i < knives.rough.size(); ++i)
     given[i].frame = PlaneFrame::of(normalize(Vec3d(knives.rough[i].plane.normal)));
@@ -106,7 +106,7 @@ Pieces cutLevelSet(const BrickGrid& level, const Mesh& whole, const Knives& kniv
   requireValid(whole);
   requireKnives(knives, options);
   CutOptions flatOptions = options;
-  if (!options.minVolume) flatOptions.minVolume = std::abs(double(determinant(level.indexToWorld.linear)));
+  if (!options.minVolume) flatOptions.minVolume = std::abs(double(determinant(level.indexToWorld().linear)));
   std::vector<std::tuple<Vec3f, Vec3f>> planes;
   for (const BladePlane& plane : knives.planes) planes.push_back(numbersOf(plane));
   const auto planeOrder = sorted(planes), cellOrder = sorted(knives.cells);

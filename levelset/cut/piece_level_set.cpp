@@ -201,21 +201,12 @@ double PieceLevelSet::volume() const {
 }
 
 std::shared_ptr<BrickGrid> PieceLevelSet::toBricks() const {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->indexToWorld.linear = Mat3f::scaling(voxelSize_);
-  grid->worldToIndex.linear = Mat3f::scaling(1 / voxelSize_);
-  grid->voxelSize = voxelSize_;
-  grid->background = -band_;
-  grid->firstBrick = firstBrick();
-  grid->brickCount = brickCount();
-  grid->table = table_->entries;
-  const std::size_t stored = storedBricks(), volume = std::size_t(BrickGrid::kVolume);
-  grid->values.reserve((2 + stored) * volume);
-  grid->values.resize(volume, -band_);
-  grid->values.resize(2 * volume, band_);
-  grid->values.resize((2 + stored) * volume);
-  std::int32_t next = 2;
-  for (std::int32_t& entry : grid->table) {
+  auto grid = std::make_shared<BrickGrid>(Lattice::uniform(voxelSize_), table_->bricks, -band_);
+  grid->reserve(2 + storedBricks());
+  grid->appendConstant(band_);
+  std::int32_t next = grid->append(storedBricks());
+  std::vector<std::int32_t> table = table_->entries;
+  for (std::int32_t& entry : table) {
     if (entry <= kInside) continue;
     const float* samples = samplesOf(entry);
     entry = next++;
@@ -223,6 +214,7 @@ std::shared_ptr<BrickGrid> PieceLevelSet::toBricks() const {
     for (int row = 0; row < kBrick * kBrick; ++row)
       std::copy_n(samples + row * kBrick, kBrick, brick + sampleOffset(0, row % kBrick, row / kBrick));
   }
+  grid->setTable(std::move(table));
   fillBorders(*grid);
   return grid;
 }

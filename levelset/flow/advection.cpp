@@ -48,13 +48,13 @@ void evaluate(const ScalarField& field, const BrickPoints& at, float* values) {
 
 /// Cuts `value` off at the least and the largest of the eight samples around a point.
 float withinCell(const BrickGrid& grid, const Vec3f& point, float value) {
-  const Vec3f q = grid.worldToIndex(point);
+  const Vec3f q = grid.worldToIndex()(point);
   constexpr float kFar = 1e9f;
   const bool isNear = q.x > -kFar && q.x < kFar && q.y > -kFar && q.y < kFar && q.z > -kFar && q.z < kFar;
-  if (!isNear) return grid.background;
+  if (!isNear) return grid.background();
   const Vec3i cell{int(std::floor(q.x)), int(std::floor(q.y)), int(std::floor(q.z))};
   const std::int32_t pool = grid.poolIndex(brickOf(cell));
-  if (pool == 0) return grid.background;
+  if (pool == 0) return grid.background();
   const float* corner =
       grid.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
   float low = corner[0], high = corner[0];
@@ -109,7 +109,8 @@ std::vector<Vec3i> overlapping(const std::vector<Vec3i>& bricks, const Lattice& 
 }
 
 GridHandle assembled(const detail::GrownBricks& grown, const BrickGrid& like) {
-  return detail::assembleGrids(grown, latticeOf(like), std::span(&like.background, 1),
+  const float background = like.background();
+  return detail::assembleGrids(grown, like.lattice(), std::span(&background, 1),
                                detail::Beyond::background)[0];
 }
 
@@ -117,27 +118,27 @@ GridHandle assembled(const detail::GrownBricks& grown, const BrickGrid& like) {
 GridHandle readThrough(const GridHandle& grid, const std::vector<Vec3i>& seeds, const VectorField& map,
                        const std::function<bool(const Vec3f&)>& isMapped, const Progress& progress) {
   const Source source(grid, Interpolation::tricubic);
-  const Lattice lattice = latticeOf(*grid);
+  const Lattice lattice = grid->lattice();
   const auto fill = [&](const Vec3i& brick, float* samples) {
     const BrickPoints points(lattice, brick);
     BrickPoints there;
     evaluate(map, points, there);
     source.read(there, samples);
     for (int i = 0; i < kOwnSamples; ++i)
-      if (!isMapped(points[i])) samples[i] = grid->background;
-    return holdsOther(samples, grid->background);
+      if (!isMapped(points[i])) samples[i] = grid->background();
+    return holdsOther(samples, grid->background());
   };
   return assembled(detail::growBricks(seeds, {}, fill, progress), *grid);
 }
 
 /// The bricks in which one grid holds anything.
 std::vector<Vec3i> ownBricks(const GridHandle& grid) {
-  return Matter(std::span(&grid, 1), latticeOf(*grid)).bricks();
+  return Matter(std::span(&grid, 1), grid->lattice()).bricks();
 }
 
 /// The bricks in which the matter of one grid arrives.
 std::vector<Vec3i> arrivals(const GridHandle& grid, const VectorField& forward, float longest) {
-  const Lattice lattice = latticeOf(*grid);
+  const Lattice lattice = grid->lattice();
   return detail::flowSeeds(ownBricks(grid), lattice, lattice, forward, longest);
 }
 
@@ -146,11 +147,11 @@ class GridStep {
  public:
   GridStep(GridHandle grid, const VectorField& velocity, float dt)
       : source_(std::move(grid), Interpolation::trilinear),
-        lattice_(latticeOf(*source_.grid)),
+        lattice_(source_.grid->lattice()),
         back_(traceBack(velocity, {.dt = dt})),
         forward_(traceBack(velocity, {.dt = -dt})) {
-    float low = source_.grid->background, high = low;
-    for (const Interval& r : source_.grid->ranges) {
+    float low = source_.grid->background(), high = low;
+    for (const Interval& r : source_.grid->ranges()) {
       low = std::min(low, r.min);
       high = std::max(high, r.max);
     }
@@ -176,7 +177,7 @@ class GridStep {
         const float corrected = samples[i] + 0.5f * (there[std::size_t(i)] - back[std::size_t(i)]);
         samples[i] = cleared(withinCell(*source_.grid, before[i], corrected));
       }
-      return holdsOther(samples, source_.grid->background);
+      return holdsOther(samples, source_.grid->background());
     };
     return assembled(detail::growBricks(seeds(), {}, fill, second), *source_.grid);
   }
@@ -193,7 +194,7 @@ class GridStep {
       evaluate(source_.field, points, samples);
       for (int i = 0; i < kOwnSamples; ++i)
         samples[i] = cleared(samples[i] + 0.5f * (samples[i] - back[std::size_t(i)]));
-      return holdsOther(samples, source_.grid->background);
+      return holdsOther(samples, source_.grid->background());
     };
     const Source corrected(
         assembled(detail::growBricks(ownBricks(source_.grid), {}, fill, second), *source_.grid),
@@ -205,7 +206,7 @@ class GridStep {
   std::vector<Vec3i> seeds() const { return arrivals(source_.grid, forward_, kLongestStep); }
 
   float cleared(float value) const {
-    return std::abs(value - source_.grid->background) <= nothing_ ? source_.grid->background : value;
+    return std::abs(value - source_.grid->background()) <= nothing_ ? source_.grid->background() : value;
   }
 
   /// `what` a step later, within the samples of `limits`.
@@ -216,7 +217,7 @@ class GridStep {
       evaluate(what.field, before, samples);
       for (int i = 0; i < kOwnSamples; ++i)
         samples[i] = cleared(withinCell(*limits.grid, before[i], samples[i]));
-      return holdsOther(samples, source_.grid->background);
+      return holdsOther(samples, source_.grid->background());
     };
     return assembled(detail::growBricks(seeds(), {}, fill, progress), *source_.grid);
   }
@@ -236,10 +237,10 @@ Lattice finestLattice(const std::vector<GridHandle>& grids) {
   const BrickGrid* finest = nullptr;
   for (const GridHandle& grid : grids) {
     if (ownBricks(grid).empty()) continue;
-    if (!finest || grid->voxelSize < finest->voxelSize) finest = grid.get();
+    if (!finest || grid->voxelSize() < finest->voxelSize()) finest = grid.get();
   }
   require(finest != nullptr, "advection: no grid holds anything");
-  return latticeOf(*finest);
+  return finest->lattice();
 }
 
 void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const AdvectionOptions& options,
@@ -287,7 +288,7 @@ void advectGridless(AdvectedGrids& result, const VelocityOfStep& velocity, const
     const VectorField* before = nullptr;
     for (const VectorField& u : velocities) {
       if (!before || before->node() != u.node())
-        detail::requireShortSteps(ownBricks(result.grids[i]), latticeOf(*result.grids[i]), u, options.dt,
+        detail::requireShortSteps(ownBricks(result.grids[i]), result.grids[i]->lattice(), u, options.dt,
                                   kLongestStep);
       before = &u;
     }
@@ -330,8 +331,7 @@ void requireSane(const std::vector<GridHandle>& grids, const AdvectionOptions& o
   require(!options.startMap || options.method == AdvectionMethod::selma,
           "advection: only selma goes on from a map");
   require(!grids.empty(), "advection: no grid holds anything");
-  for (const GridHandle& grid : grids)
-    require(grid != nullptr && !grid->isPacked(), "advection: grids must be there, and not packed");
+  for (const GridHandle& grid : grids) require(grid != nullptr, "advection: grids must be there");
 }
 
 }  // namespace
@@ -341,7 +341,7 @@ GridHandle throughMap(const GridHandle& grid, const FlowMap& map, const Matter& 
   if (map.isIdentity()) return grid;
   detail::BrickTable kept("advection");
   for (const Vec3i& brick : map.bricks) kept.set(brick, 0);
-  const std::vector<Vec3i> seeds = overlapping(matterBricks(map, matter), map.lattice, latticeOf(*grid));
+  const std::vector<Vec3i> seeds = overlapping(matterBricks(map, matter), map.lattice, grid->lattice());
   return readThrough(
       grid, seeds, mapField(map), [&](const Vec3f& p) { return kept.at(brickAt(map.lattice, p)) >= 0; },
       progress);
@@ -381,8 +381,8 @@ double estimatedAdvectionBytes(const std::vector<GridHandle>& grids, const Advec
     const double own = double(ownBricks(grid).size());
     bricks += own;
     held += double(grid->memoryBytes());
-    if (own > 0 && (voxel == 0 || grid->voxelSize < voxel)) {
-      voxel = grid->voxelSize;
+    if (own > 0 && (voxel == 0 || grid->voxelSize() < voxel)) {
+      voxel = grid->voxelSize();
       finest = own;
     }
   }

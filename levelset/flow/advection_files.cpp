@@ -27,7 +27,7 @@ constexpr const char* kMapKindValue = "X - x, world units";
 VdbGridLabel labelFor(const VdbGrid& original, const BrickGrid& bricks) {
   VdbGridLabel label = labelOf(original);
   // Fog that is not 0 outside keeps its values; its class comes back with the metadata.
-  if (label.gridClass == VdbGridInfo::Class::fogVolume && bricks.background != 0)
+  if (label.gridClass == VdbGridInfo::Class::fogVolume && bricks.background() != 0)
     label.gridClass = VdbGridInfo::Class::unknown;
   return label;
 }

@@ -40,8 +40,8 @@ constexpr int kReach = 2;
 bool ownBox(const BrickGrid& grid, std::int32_t pool, Vec3i& first, Vec3i& last) {
   first = {BrickGrid::kBrick, BrickGrid::kBrick, BrickGrid::kBrick};
   last = {-1, -1, -1};
-  if (grid.ranges[std::size_t(pool)].isPoint()) {
-    if (grid.ranges[std::size_t(pool)].min == grid.background) return false;
+  if (grid.ranges()[std::size_t(pool)].isPoint()) {
+    if (grid.ranges()[std::size_t(pool)].min == grid.background()) return false;
     std::swap(first, last);
     first = {0, 0, 0};
     last = {BrickGrid::kBrick - 1, BrickGrid::kBrick - 1, BrickGrid::kBrick - 1};
@@ -51,7 +51,7 @@ bool ownBox(const BrickGrid& grid, std::int32_t pool, Vec3i& first, Vec3i& last)
   for (int z = 0; z < BrickGrid::kBrick; ++z)
     for (int y = 0; y < BrickGrid::kBrick; ++y)
       for (int x = 0; x < BrickGrid::kBrick; ++x)
-        if (samples[sampleOffset(x, y, z)] != grid.background) {
+        if (samples[sampleOffset(x, y, z)] != grid.background()) {
           first = min(first, Vec3i{x, y, z});
           last = max(last, Vec3i{x, y, z});
         }
@@ -125,12 +125,12 @@ struct Matter::Table {
 Matter::Matter(std::span<const std::shared_ptr<const BrickGrid>> grids, const Lattice& lattice)
     : lattice_(lattice), table_(std::make_unique<Table>()) {
   for (const auto& grid : grids) {
-    require(grid != nullptr && !grid->isPacked(), "Matter: grids must be there, and not packed");
-    const Vec3i count = grid->brickCount;
+    require(grid != nullptr, "Matter: grids must be there");
+    const Vec3i count = grid->brickCount();
     for (int z = 0; z < count.z; ++z)
       for (int y = 0; y < count.y; ++y)
         for (int x = 0; x < count.x; ++x) {
-          const Vec3i brick = grid->firstBrick + Vec3i{x, y, z};
+          const Vec3i brick = grid->firstBrick() + Vec3i{x, y, z};
           Vec3i first, last;
           if (!ownBox(*grid, grid->poolIndex(brick), first, last)) continue;
           const Vec3i reach{kReach, kReach, kReach};
@@ -140,7 +140,7 @@ Matter::Matter(std::span<const std::shared_ptr<const BrickGrid>> grids, const La
                         high = brick * BrickGrid::kBrick + last + reach;
             const Vec3i voxel{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y,
                               corner & 4 ? high.z : low.z};
-            box = box.including(lattice.worldToIndex(grid->indexToWorld(Vec3f(voxel))));
+            box = box.including(lattice.worldToIndex(grid->indexToWorld()(Vec3f(voxel))));
           }
           const Vec3i low = cornerBrick(box.min), high = cornerBrick(box.max);
           for (int k = low.z; k <= high.z; ++k)

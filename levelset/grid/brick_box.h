@@ -31,4 +31,9 @@ struct BrickBox {
   }
 };
 
+/// The order of the numbers of a box: z, then y, then x.
+inline bool comesBefore(const Vec3i& a, const Vec3i& b) {
+  return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
 }  // namespace nephele

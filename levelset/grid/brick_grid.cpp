@@ -12,8 +12,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nephele/levelset/grid/brick_samples.h"
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/modeling/base/assertion.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -60,71 +61,117 @@ void fillBorder(BrickGrid& grid, const PlacedBrick& placed) {
 
 }  // namespace
 
-float BrickGrid::at(const Vec3i& voxel) const {
-  const Vec3i b = brickOf(voxel);
-  if (!covers(b)) return background;
-  const auto pool = std::size_t(table[tableIndex(b)]);
-  const std::size_t sample =
-      pool * kVolume +
-      std::size_t(sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)));
-  if (!isPacked()) return values[sample];
-  const BrickCode code = brickCode(ranges[pool]);
-  return code.low + code.unit * float(codes[sample]);
+BrickLayout::BrickLayout(const Lattice& lattice, const BrickBox& places, float background)
+    : background_(background), places_(places) {
+  setLattice(lattice);
+  require(places.count.x >= 0 && places.count.y >= 0 && places.count.z >= 0,
+          "grid: the table must have one entry per brick position");
+  requireHoldable("grid", places);
+  table_.assign(places.size(), 0);
+  ranges_.assign(1, Interval::of(background));
 }
 
-std::size_t BrickGrid::memoryBytes() const {
-  return sizeof(BrickGrid) + table.capacity() * sizeof(std::int32_t) + values.capacity() * sizeof(float) +
-         codes.capacity() * sizeof(std::uint16_t) + ranges.capacity() * sizeof(Interval);
-}
-
-Box BrickGrid::worldBox() const {
+Box BrickLayout::worldBox() const {
   Box box;
-  if (table.empty()) return box;
+  if (table_.empty()) return box;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3i b{firstBrick.x + (corner & 1 ? brickCount.x : 0),
-                  firstBrick.y + (corner & 2 ? brickCount.y : 0),
-                  firstBrick.z + (corner & 4 ? brickCount.z : 0)};
-    box = box.including(indexToWorld(Vec3f(b * kBrick)));
+    const Vec3i b{firstBrick().x + (corner & 1 ? brickCount().x : 0),
+                  firstBrick().y + (corner & 2 ? brickCount().y : 0),
+                  firstBrick().z + (corner & 4 ? brickCount().z : 0)};
+    box = box.including(indexToWorld()(Vec3f(b * kBrick)));
   }
   return box;
 }
 
-void pack(BrickGrid& grid) {
-  if (grid.isPacked()) return;
-  for (const Interval& range : grid.ranges)
-    require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
-  // So many that a batch of floats is worth returning to the system.
-  constexpr std::size_t kBatch = 2048;
-  const std::size_t bricks = grid.poolSize();
-  detail::reserveLarge(grid.codes, bricks * kVolume);
-  for (std::size_t first = 0; first < bricks; first += kBatch) {
-    const std::size_t last = std::min(first + kBatch, bricks);
-    grid.codes.resize(last * kVolume);
-    parallelFor(last - first, kBricksPerTask, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t b = first + begin; b < first + end; ++b) {
-        detail::encodeBrick(grid.values.data() + b * kVolume, grid.ranges[b],
-                            grid.codes.data() + b * kVolume);
-      }
-    });
-    detail::releasePages(grid.values.data() + first * kVolume, grid.values.data() + last * kVolume);
-  }
-  std::vector<float>().swap(grid.values);
+void BrickLayout::setLattice(const Lattice& lattice) {
+  require(lattice.voxelSize > 0 && std::isfinite(lattice.voxelSize), "grid: the voxel size must be > 0");
+  lattice_ = lattice;
 }
 
-std::vector<PlacedBrick> placedBricks(const BrickGrid& grid) {
+void BrickLayout::place(const Vec3i& brick, std::int32_t pool) {
+  NEPHELE_ASSERT(covers(brick));
+  NEPHELE_ASSERT(pool >= 0 && std::size_t(pool) < poolSize());
+  table_[tableIndex(brick)] = pool;
+}
+
+void BrickLayout::setTable(std::vector<std::int32_t> table) {
+  require(table.size() == places_.size(), "grid: the table must have one entry per brick position");
+  for (const std::int32_t pool : table)
+    require(pool >= 0 && std::size_t(pool) < poolSize(), "grid: the table names a brick that is not there");
+  table_ = std::move(table);
+}
+
+void BrickLayout::setRange(std::int32_t pool, const Interval& range) {
+  NEPHELE_ASSERT(pool >= 0 && std::size_t(pool) < poolSize());
+  ranges_[std::size_t(pool)] = range;
+}
+
+void BrickLayout::requirePool(std::size_t size) const {
+  require(double(size) <= kMostBricks, "grid: there are more bricks than can be numbered; use larger voxels");
+}
+
+BrickGrid::BrickGrid(const Lattice& lattice, const BrickBox& places, float background)
+    : BrickLayout(lattice, places, background), values_(kVolume, background) {}
+
+void BrickGrid::reserve(std::size_t bricks) {
+  requirePool(bricks);
+  detail::reserveLarge(values_, bricks * kVolume);
+  ranges_.reserve(bricks);
+}
+
+std::int32_t BrickGrid::append(std::size_t bricks) {
+  const std::size_t first = poolSize();
+  requirePool(first + bricks);
+  const std::size_t count = (first + bricks) * kVolume;
+  if (values_.capacity() < count)
+    detail::reserveLarge(values_, std::max(count, values_.size() + values_.size() / 2));
+  values_.resize(count);
+  ranges_.resize(first + bricks, Interval::of(0.0f));
+  return std::int32_t(first);
+}
+
+std::int32_t BrickGrid::appendConstant(float value) {
+  const std::size_t first = poolSize();
+  requirePool(first + 1);
+  values_.resize((first + 1) * kVolume, value);
+  ranges_.push_back(Interval::of(value));
+  return std::int32_t(first);
+}
+
+float BrickGrid::at(const Vec3i& voxel) const {
+  const Vec3i b = brickOf(voxel);
+  if (!covers(b)) return background();
+  return brick(poolIndex(b))[sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z))];
+}
+
+void BrickGrid::multiply(float factor) {
+  background_ *= factor;
+  for (float& value : values_) value *= factor;
+  for (Interval& range : ranges_) {
+    const float a = range.min * factor, b = range.max * factor;
+    range = {std::min(a, b), std::max(a, b)};
+  }
+}
+
+std::size_t BrickGrid::memoryBytes() const {
+  return sizeof(BrickGrid) + table().capacity() * sizeof(std::int32_t) + values_.capacity() * sizeof(float) +
+         ranges().capacity() * sizeof(Interval);
+}
+
+std::vector<PlacedBrick> placedBricks(const BrickLayout& grid) {
   constexpr std::int64_t kNone = -1, kSeveral = -2;
   std::vector<std::int64_t> position(grid.poolSize(), kNone);
-  for (std::size_t i = 0; i < grid.table.size(); ++i) {
-    std::int64_t& p = position[std::size_t(grid.table[i])];
+  for (std::size_t i = 0; i < grid.table().size(); ++i) {
+    std::int64_t& p = position[std::size_t(grid.table()[i])];
     p = p == kNone ? std::int64_t(i) : kSeveral;
   }
   std::vector<PlacedBrick> placed;
   for (std::size_t pool = 1; pool < position.size(); ++pool) {
     if (position[pool] < 0) continue;
-    const std::int64_t i = position[pool], row = i / grid.brickCount.x;
-    placed.push_back(
-        {std::int32_t(pool), grid.firstBrick + Vec3i{int(i % grid.brickCount.x), int(row % grid.brickCount.y),
-                                                     int(row / grid.brickCount.y)}});
+    const std::int64_t i = position[pool], row = i / grid.brickCount().x;
+    placed.push_back({std::int32_t(pool),
+                      grid.firstBrick() + Vec3i{int(i % grid.brickCount().x), int(row % grid.brickCount().y),
+                                                int(row / grid.brickCount().y)}});
   }
   return placed;
 }
@@ -160,19 +207,17 @@ Interval rangeOfBrick(const float* samples) {
 }
 
 void fillBorders(BrickGrid& grid) {
-  require(!grid.isPacked(), "fillBorders: the grid must not be packed");
-  grid.ranges.resize(grid.values.size() / kVolume);
   const std::vector<PlacedBrick> placed = placedBricks(grid);
   parallelFor(placed.size(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) fillBorder(grid, placed[i]);
   });
   parallelFor(grid.poolSize(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) grid.ranges[i] = rangeOfBrick(grid.brick(std::int32_t(i)));
+    for (std::size_t i = begin; i < end; ++i)
+      grid.setRange(std::int32_t(i), rangeOfBrick(grid.brick(std::int32_t(i))));
   });
 }
 
 std::size_t activeVoxelCount(const BrickGrid& grid, const Interval& band) {
-  require(!grid.isPacked(), "activeVoxelCount: the grid must not be packed");
   std::vector<int> perBrick(grid.poolSize());
   parallelFor(grid.poolSize(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -187,53 +232,8 @@ std::size_t activeVoxelCount(const BrickGrid& grid, const Interval& band) {
     }
   });
   std::size_t count = 0;
-  for (const std::int32_t pool : grid.table) count += std::size_t(perBrick[std::size_t(pool)]);
+  for (const std::int32_t pool : grid.table()) count += std::size_t(perBrick[std::size_t(pool)]);
   return count;
-}
-
-BrickRanges::BrickRanges(const BrickGrid& grid) : grid_(grid) {
-  Vec3i count = grid.brickCount;
-  while (std::max({count.x, count.y, count.z}) > 4) {
-    const Vec3i finer = count;
-    count = {(finer.x + 1) / 2, (finer.y + 1) / 2, (finer.z + 1) / 2};
-    Level level{count, {}};
-    level.ranges.reserve(std::size_t(count.x) * count.y * count.z);
-    for (int z = 0; z < count.z; ++z)
-      for (int y = 0; y < count.y; ++y)
-        for (int x = 0; x < count.x; ++x) {
-          Interval range = at(levels_.size(), {2 * x, 2 * y, 2 * z});
-          for (int child = 1; child < 8; ++child) {
-            const Vec3i c{2 * x + (child & 1), 2 * y + (child >> 1 & 1), 2 * z + (child >> 2)};
-            if (c.x < finer.x && c.y < finer.y && c.z < finer.z) range = range.hull(at(levels_.size(), c));
-          }
-          level.ranges.push_back(range);
-        }
-    levels_.push_back(std::move(level));
-  }
-}
-
-Interval BrickRanges::at(std::size_t level, const Vec3i& cell) const {
-  const Vec3i& count = level == 0 ? grid_.brickCount : levels_[level - 1].count;
-  const std::size_t i = (std::size_t(cell.z) * count.y + std::size_t(cell.y)) * count.x + std::size_t(cell.x);
-  return level == 0 ? grid_.ranges[std::size_t(grid_.table[i])] : levels_[level - 1].ranges[i];
-}
-
-Interval BrickRanges::over(const Vec3i& first, const Vec3i& last) const {
-  const Interval background = Interval::of(grid_.background);
-  const Vec3i low = max(first, grid_.firstBrick),
-              high = min(last, grid_.firstBrick + grid_.brickCount - Vec3i{1, 1, 1});
-  if (low.x > high.x || low.y > high.y || low.z > high.z) return background;
-  Vec3i a = low - grid_.firstBrick, b = high - grid_.firstBrick;
-  std::size_t level = 0;
-  for (; std::max({b.x - a.x, b.y - a.y, b.z - a.z}) >= 4; ++level) {
-    a = {a.x / 2, a.y / 2, a.z / 2};
-    b = {b.x / 2, b.y / 2, b.z / 2};
-  }
-  Interval range = low == first && high == last ? at(level, a) : background;
-  for (int z = a.z; z <= b.z; ++z)
-    for (int y = a.y; y <= b.y; ++y)
-      for (int x = a.x; x <= b.x; ++x) range = range.hull(at(level, {x, y, z}));
-  return range;
 }
 
 }  // namespace nephele

@@ -121,16 +121,8 @@ std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, 
     last = &b == placed.data() ? b : max(last, b);
   }
   for (int c = 0; c < grown.components; ++c) {
-    auto grid = std::make_shared<BrickGrid>();
-    grid->indexToWorld = lattice.indexToWorld;
-    grid->worldToIndex = lattice.worldToIndex;
-    grid->voxelSize = lattice.voxelSize;
-    grid->background = backgrounds[std::size_t(c)];
-    grid->firstBrick = first;
-    grid->brickCount = last - first + Vec3i{1, 1, 1};
-    grid->table.assign(
-        std::size_t(grid->brickCount.x) * std::size_t(grid->brickCount.y) * std::size_t(grid->brickCount.z),
-        0);
+    auto grid = std::make_shared<BrickGrid>(lattice, BrickBox{first, last - first + Vec3i{1, 1, 1}},
+                                            backgrounds[std::size_t(c)]);
     const auto fill = [&](const Vec3i& brick, float* target) {
       const std::int32_t own = numbers.at(brick);
       bool isBackground = true;
@@ -152,9 +144,9 @@ std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, 
               const float value = from
                                       ? from[(place(pz, side.z, z) * kBrick + place(py, side.y, y)) * kBrick +
                                              place(px, side.x, x)]
-                                      : grid->background;
+                                      : grid->background();
               target[((z + pz.target) * kWidth + y + py.target) * kWidth + x + px.target] = value;
-              isBackground &= value == grid->background;
+              isBackground &= value == grid->background();
             }
       }
       return !isBackground;
@@ -167,20 +159,16 @@ std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, 
         place[i] = beyond == Beyond::nearest || fill(placed[i], samples.data()) ? 1 : 0;
     });
     std::int32_t next = 1;
-    for (std::size_t i = 0; i < placed.size(); ++i)
-      if (place[i] > 0) {
-        place[i] = next++;
-        grid->table[grid->tableIndex(placed[i])] = place[i];
-      }
-    resizeLarge(grid->values, std::size_t(next) * BrickGrid::kVolume);
-    grid->ranges.resize(std::size_t(next));
-    std::fill_n(grid->values.begin(), BrickGrid::kVolume, grid->background);
-    grid->ranges[0] = Interval::of(grid->background);
+    for (std::int32_t& p : place)
+      if (p > 0) p = next++;
+    grid->append(std::size_t(next) - 1);
     parallelFor(placed.size(), 16, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         if (place[i] == 0) continue;
-        fill(placed[i], grid->brick(place[i]));
-        grid->ranges[std::size_t(place[i])] = rangeOfBrick(grid->brick(place[i]));
+        float* samples = grid->brick(place[i]);
+        fill(placed[i], samples);
+        grid->setRange(place[i], rangeOfBrick(samples));
+        grid->place(placed[i], place[i]);
       }
     });
     grids.push_back(std::move(grid));

@@ -42,22 +42,6 @@ void withBorders(const BrickSamples& samples, const Vec3i& brick, float* stored)
     }
 }
 
-/// Room for `count` values in all. What stands there moves piece by piece, so that it is never held twice.
-void reserveFor(std::vector<std::uint16_t>& values, std::size_t count) {
-  constexpr std::size_t kPiece = std::size_t(1) << 21;
-  if (count <= values.capacity()) return;
-  std::vector<std::uint16_t> larger;
-  // More will follow what already stands there.
-  reserveLarge(larger, values.size() > kVolume ? count + count / 2 : count);
-  for (std::size_t first = 0; first < values.size(); first += kPiece) {
-    std::uint16_t* begin = values.data() + first;
-    std::uint16_t* end = values.data() + std::min(first + kPiece, values.size());
-    larger.insert(larger.end(), begin, end);
-    releasePages(begin, end);
-  }
-  values.swap(larger);
-}
-
 }  // namespace
 
 void BrickSamples::append(const std::vector<Vec3i>& bricks) {
@@ -100,29 +84,12 @@ void BrickSamples::separate() {
   }
 }
 
-std::shared_ptr<BrickGrid> emptyPackedGrid(const BrickSamples& samples) {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->voxelSize = samples.voxelSize;
-  grid->indexToWorld.linear = Mat3f::scaling(samples.voxelSize);
-  grid->worldToIndex.linear = Mat3f::scaling(1.0f / samples.voxelSize);
-  grid->background = samples.background;
-  grid->firstBrick = samples.places.first;
-  grid->brickCount = samples.places.count;
-  grid->table.resize(samples.table.size());
-  grid->codes.resize(kVolume);
-  grid->ranges.push_back(Interval::of(samples.background));
-  return grid;
+std::shared_ptr<PackedGrid> emptyPackedGrid(const BrickSamples& samples) {
+  return std::make_shared<PackedGrid>(Lattice::uniform(samples.voxelSize), samples.places,
+                                      samples.background);
 }
 
-void encodeBrick(const float* samples, const Interval& range, std::uint16_t* codes) {
-  require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
-  const float low = range.min, width = range.max - low;
-  const float scale = width > 0 ? BrickCode::kLargest / width : 0.0f;
-  for (std::size_t i = 0; i < kVolume; ++i)
-    codes[i] = std::uint16_t(std::min((samples[i] - low) * scale + 0.5f, BrickCode::kLargest));
-}
-
-void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packing>& packing) {
+void appendPacked(PackedGrid& grid, BrickSamples samples, const std::vector<Packing>& packing) {
   std::vector<PlacedBrick> chosen;
   for (const PlacedBrick& brick : samples.placed)
     if (packing[std::size_t(brick.pool)] != Packing::leaveOut) chosen.push_back(brick);
@@ -132,13 +99,12 @@ void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packi
   std::stable_sort(chosen.begin(), chosen.end(),
                    [&](const PlacedBrick& a, const PlacedBrick& b) { return groupOf(a) < groupOf(b); });
   const std::size_t start = grid.poolSize();
-  reserveFor(grid.codes, (start + chosen.size()) * kVolume);
-  grid.ranges.resize(start + chosen.size());
+  grid.reserve(start + chosen.size());
   for (std::size_t first = 0; first < chosen.size();) {
     const int group = groupOf(chosen[first]);
     std::size_t last = first;
     while (last < chosen.size() && groupOf(chosen[last]) == group) ++last;
-    grid.codes.resize((start + last) * kVolume);
+    grid.append(last - first);
     parallelFor(last - first, kBricksPerTask, [&](std::size_t begin, std::size_t end) {
       std::array<float, kVolume> stored;
       for (std::size_t i = first + begin; i < first + end; ++i) {
@@ -149,9 +115,8 @@ void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packi
           for (float& value : stored) value = std::abs(value);
           range = abs(range);
         }
-        encodeBrick(stored.data(), range, grid.codes.data() + (start + i) * kVolume);
-        grid.ranges[start + i] = range;
-        grid.table[grid.tableIndex(brick.brick)] = std::int32_t(start + i);
+        grid.encode(std::int32_t(start + i), stored.data(), range);
+        grid.place(brick.brick, std::int32_t(start + i));
       }
     });
     // The next group reads one brick below its own.
@@ -162,15 +127,18 @@ void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packi
   }
 }
 
-std::shared_ptr<BrickGrid> packed(BrickSamples samples) {
-  std::shared_ptr<BrickGrid> grid = emptyPackedGrid(samples);
-  grid->table = samples.table;
-  // Constants keep their places.
+std::shared_ptr<PackedGrid> packed(BrickSamples samples) {
+  std::shared_ptr<PackedGrid> grid = emptyPackedGrid(samples);
+  // Constants keep their places; brick 0 is the background already.
   const std::size_t constants = samples.pool.size() - samples.placed.size();
-  grid->codes.resize(constants * kVolume);
-  grid->ranges.assign(samples.ranges.begin(), samples.ranges.begin() + std::ptrdiff_t(constants));
-  for (const Interval& range : grid->ranges)
-    require(std::isfinite(range.min) && std::isfinite(range.max), "pack: every sample must be finite");
+  grid->append(constants - 1);
+  for (std::size_t c = 1; c < constants; ++c) {
+    const std::array<float, kVolume> none{};
+    grid->encode(std::int32_t(c), none.data(), samples.ranges[c]);
+  }
+  for (std::size_t i = 0; i < samples.table.size(); ++i)
+    if (samples.table[i] > 0 && std::size_t(samples.table[i]) < constants)
+      grid->place(samples.places.at(i), samples.table[i]);
   const std::vector<Packing> all(samples.pool.size(), Packing::whole);
   appendPacked(*grid, std::move(samples), all);
   return grid;

@@ -86,7 +86,7 @@ BrickSamples bakeSamples(const ScalarField& field, const BakeOptions& options,
                          const Progress& progress = silent());
 
 /// A packed grid with the layout of `samples` and without bricks other than the background.
-std::shared_ptr<BrickGrid> emptyPackedGrid(const BrickSamples& samples);
+std::shared_ptr<PackedGrid> emptyPackedGrid(const BrickSamples& samples);
 
 /// What becomes of a brick when it is packed.
 enum class Packing : std::uint8_t {
@@ -98,12 +98,9 @@ enum class Packing : std::uint8_t {
 /// Appends bricks of `samples` with their borders to a packed grid whose table covers theirs; `packing` has
 /// an entry for every pool brick. The stores are given back while it works, from below in z. Uses all cores.
 /// @throws Error if a sample is not finite.
-void appendPacked(BrickGrid& grid, BrickSamples samples, const std::vector<Packing>& packing);
+void appendPacked(PackedGrid& grid, BrickSamples samples, const std::vector<Packing>& packing);
 
-/// What `pack` makes of the grid with these samples.
-std::shared_ptr<BrickGrid> packed(BrickSamples samples);
-
-/// The codes of the kVolume samples of a brick; `range` contains them. @throws Error if it is not finite.
-void encodeBrick(const float* samples, const Interval& range, std::uint16_t* codes);
+/// The grid of these samples.
+std::shared_ptr<PackedGrid> packed(BrickSamples samples);
 
 }  // namespace nephele::detail

@@ -9,6 +9,7 @@
 
 #include <cmath>
 
+#include "nephele/levelset/grid/brick_ranges.h"
 #include "nephele/levelset/grid/grid_kernels.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/constant_node.h"
@@ -22,22 +23,6 @@ constexpr float kTrilinearRounding = 2e-6f;
 constexpr float kTricubicRounding = 1e-5f;
 /// Rounding of index coordinates, relative to the largest term of the map.
 constexpr double kIndexRounding = 1e-6;
-
-void requireTable(const BrickGrid* grid) {
-  require(grid != nullptr, "gridField: the grid must not be null");
-  const Vec3i n = grid->brickCount;
-  require(n.x >= 0 && n.y >= 0 && n.z >= 0 && grid->table.size() == std::size_t(n.x) * n.y * n.z,
-          "gridField: the table must have one entry per brick position");
-  for (const std::int32_t pool : grid->table)
-    require(pool >= 0 && std::size_t(pool) < grid->poolSize(),
-            "gridField: the table names a brick that is not there");
-  require(grid->voxelSize > 0 && std::isfinite(grid->voxelSize), "gridField: voxelSize must be > 0");
-}
-
-void requireSamples(const BrickGrid& grid) {
-  require((grid.isPacked() ? grid.codes.size() : grid.values.size()) == grid.poolSize() * BrickGrid::kVolume,
-          "gridField: values and ranges must belong to the same number of bricks");
-}
 
 /// What values interpolated between samples of range `r` can be.
 Interval interpolated(const Interval& r, Interpolation interpolation) {
@@ -53,34 +38,20 @@ Interval interpolated(const Interval& r, Interpolation interpolation) {
   return {r.min >= 0 && low < 0 ? 0.0f : low, r.max <= 0 && high > 0 ? 0.0f : high};
 }
 
-/// One grid, its ranges, and how to read it.
-class Sampler {
+/// Ranges of what is interpolated between the samples of a grid.
+class GridRanges {
  public:
-  Sampler(std::shared_ptr<const BrickGrid> grid, Interpolation interpolation)
-      : grid_((requireTable(grid.get()), std::move(grid))), ranges_(*grid_), interpolation_(interpolation) {}
+  GridRanges(std::shared_ptr<const BrickLayout> layout, Interpolation interpolation)
+      : layout_(std::move(layout)), ranges_(*layout_), interpolation_(interpolation) {}
 
-  const std::shared_ptr<const BrickGrid>& grid() const { return grid_; }
-
-  void eval(const PointBlock& points, float* values) const {
-    if (interpolation_ == Interpolation::trilinear)
-      sampleTrilinear(*grid_, points, values);
-    else
-      sampleTricubic(*grid_, points, values);
-  }
-
-  void evalGrad(const PointBlock& points, float* values, const BlockLanes<3>& grads) const {
-    if (interpolation_ == Interpolation::trilinear)
-      sampleTrilinearGrad(*grid_, points, values, grads);
-    else
-      sampleTricubicGrad(*grid_, points, values, grads);
-  }
+  const BrickLayout& layout() const { return *layout_; }
 
   Interval range(const Box& box) const {
-    if (box.isEmpty() || grid_->table.empty()) return Interval::of(grid_->background);
-    const Mat3f& m = grid_->worldToIndex.linear;
+    if (box.isEmpty() || layout_->table().empty()) return Interval::of(layout_->background());
+    const Mat3f& m = layout_->worldToIndex().linear;
     Vec3i first, last;
     for (int axis = 0; axis < 3; ++axis) {
-      double low = grid_->worldToIndex.translation[axis], high = low, size = std::abs(low);
+      double low = layout_->worldToIndex().translation[axis], high = low, size = std::abs(low);
       for (int c = 0; c < 3; ++c) {
         if (m(axis, c) == 0) continue;
         const double a = double(m(axis, c)) * box.min[c], b = double(m(axis, c)) * box.max[c];
@@ -97,23 +68,61 @@ class Sampler {
  private:
   /// Brick coordinate of an index coordinate, at most one brick outside the table; NaN goes to the far side.
   int brickAt(double q, int axis, bool upward) const {
-    const double below = grid_->firstBrick[axis] - 1.0, above = below + grid_->brickCount[axis] + 1.0;
+    const double below = layout_->firstBrick()[axis] - 1.0, above = below + layout_->brickCount()[axis] + 1.0;
     const double b = std::floor(q / BrickGrid::kBrick);
     if (std::isnan(b)) return int(upward ? above : below);
     return int(b < below ? below : b > above ? above : b);
   }
 
-  std::shared_ptr<const BrickGrid> grid_;
+  std::shared_ptr<const BrickLayout> layout_;
   BrickRanges ranges_;
   Interpolation interpolation_;
 };
 
+template <class Grid>
+std::shared_ptr<const Grid> notNull(std::shared_ptr<const Grid> grid) {
+  require(grid != nullptr, "gridField: the grid must not be null");
+  return grid;
+}
+
+/// One grid, its ranges, and how to read it.
+template <class Grid>
+class Sampler {
+ public:
+  Sampler(std::shared_ptr<const Grid> grid, Interpolation interpolation)
+      : grid_(notNull(std::move(grid))), ranges_(grid_, interpolation), interpolation_(interpolation) {}
+
+  const std::shared_ptr<const Grid>& grid() const { return grid_; }
+
+  void eval(const PointBlock& points, float* values) const {
+    if (interpolation_ == Interpolation::trilinear)
+      sampleTrilinear(*grid_, points, values);
+    else
+      sampleTricubic(*grid_, points, values);
+  }
+
+  void evalGrad(const PointBlock& points, float* values, const BlockLanes<3>& grads) const {
+    if (interpolation_ == Interpolation::trilinear)
+      sampleTrilinearGrad(*grid_, points, values, grads);
+    else
+      sampleTricubicGrad(*grid_, points, values, grads);
+  }
+
+  Interval range(const Box& box) const { return ranges_.range(box); }
+
+ private:
+  std::shared_ptr<const Grid> grid_;
+  GridRanges ranges_;
+  Interpolation interpolation_;
+};
+
+template <class Grid>
 class GridNode final : public FieldNode<float> {
  public:
-  GridNode(std::shared_ptr<const BrickGrid> grid, Interpolation interpolation)
+  GridNode(std::shared_ptr<const Grid> grid, Interpolation interpolation)
       : sampler_(std::move(grid), interpolation) {}
 
-  const std::shared_ptr<const BrickGrid>& grid() const { return sampler_.grid(); }
+  const std::shared_ptr<const Grid>& grid() const { return sampler_.grid(); }
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch&) const override {
     sampler_.eval(points, values[0]);
@@ -126,15 +135,15 @@ class GridNode final : public FieldNode<float> {
   NodePtr<float> restricted(Restriction& restriction) const override {
     return detail::constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
-  float differenceStep() const override { return grid()->voxelSize; }
+  float differenceStep() const override { return grid()->voxelSize(); }
 
  private:
-  Sampler sampler_;
+  Sampler<Grid> sampler_;
 };
 
 class RangedNode final : public FieldNode<float> {
  public:
-  RangedNode(std::shared_ptr<const Sampler> ranges, NodePtr<float> field)
+  RangedNode(std::shared_ptr<const GridRanges> ranges, NodePtr<float> field)
       : ranges_(std::move(ranges)), field_(std::move(field)) {}
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
@@ -152,15 +161,16 @@ class RangedNode final : public FieldNode<float> {
   float differenceStep() const override { return field_->differenceStep(); }
 
  private:
-  std::shared_ptr<const Sampler> ranges_;
+  std::shared_ptr<const GridRanges> ranges_;
   NodePtr<float> field_;
 };
 
 class VectorGridNode final : public FieldNode<Vec3f> {
  public:
   VectorGridNode(VectorGrids grids, Interpolation interpolation)
-      : samplers_{Sampler(std::move(grids[0]), interpolation), Sampler(std::move(grids[1]), interpolation),
-                  Sampler(std::move(grids[2]), interpolation)} {}
+      : samplers_{Sampler<BrickGrid>(std::move(grids[0]), interpolation),
+                  Sampler<BrickGrid>(std::move(grids[1]), interpolation),
+                  Sampler<BrickGrid>(std::move(grids[2]), interpolation)} {}
 
   VectorGrids grids() const { return {samplers_[0].grid(), samplers_[1].grid(), samplers_[2].grid()}; }
 
@@ -179,43 +189,36 @@ class VectorGridNode final : public FieldNode<Vec3f> {
     return detail::constantFrom<Vec3f>(range(restriction.box, restriction.memo.ranges));
   }
   float differenceStep() const override {
-    return std::fmin(samplers_[0].grid()->voxelSize,
-                     std::fmin(samplers_[1].grid()->voxelSize, samplers_[2].grid()->voxelSize));
+    return std::fmin(samplers_[0].grid()->voxelSize(),
+                     std::fmin(samplers_[1].grid()->voxelSize(), samplers_[2].grid()->voxelSize()));
   }
 
  private:
-  std::array<Sampler, 3> samplers_;
+  std::array<Sampler<BrickGrid>, 3> samplers_;
 };
 
 }  // namespace
 
 ScalarField gridField(std::shared_ptr<const BrickGrid> grid, Interpolation interpolation) {
-  if (grid) requireSamples(*grid);
-  return ScalarField(std::make_shared<GridNode>(std::move(grid), interpolation));
+  return ScalarField(std::make_shared<GridNode<BrickGrid>>(std::move(grid), interpolation));
+}
+
+ScalarField gridField(std::shared_ptr<const PackedGrid> grid, Interpolation interpolation) {
+  return ScalarField(std::make_shared<GridNode<PackedGrid>>(std::move(grid), interpolation));
 }
 
 VectorField gridField(VectorGrids grids, Interpolation interpolation) {
-  for (const auto& grid : grids)
-    if (grid) requireSamples(*grid);
   return VectorField(std::make_shared<VectorGridNode>(std::move(grids), interpolation));
 }
 
-ScalarField withRangesOf(const BrickGrid& grid, const ScalarField& field) {
-  auto layout = std::make_shared<BrickGrid>();
-  layout->indexToWorld = grid.indexToWorld;
-  layout->worldToIndex = grid.worldToIndex;
-  layout->voxelSize = grid.voxelSize;
-  layout->background = grid.background;
-  layout->firstBrick = grid.firstBrick;
-  layout->brickCount = grid.brickCount;
-  layout->table = grid.table;
-  layout->ranges = grid.ranges;
+ScalarField withRangesOf(const BrickLayout& grid, const ScalarField& field) {
   return ScalarField(std::make_shared<RangedNode>(
-      std::make_shared<Sampler>(std::move(layout), Interpolation::trilinear), field.node()));
+      std::make_shared<GridRanges>(std::make_shared<BrickLayout>(grid), Interpolation::trilinear),
+      field.node()));
 }
 
 std::shared_ptr<const BrickGrid> gridOf(const ScalarField& field) {
-  const auto* node = dynamic_cast<const GridNode*>(field.node().get());
+  const auto* node = dynamic_cast<const GridNode<BrickGrid>*>(field.node().get());
   return node ? node->grid() : nullptr;
 }
 

@@ -15,307 +15,15 @@
 
 #include "nephele/levelset/grid/grid_kernels.h"
 
-#include <algorithm>
-#include <cmath>
 #include <type_traits>
+
+#include "nephele/levelset/grid/detail/grid_map.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nephele/levelset/grid/grid_kernels.cpp"
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-#ifndef NEPHELE_GRID_KERNELS_ONCE
-#define NEPHELE_GRID_KERNELS_ONCE
-
-namespace nephele {
-
-namespace {
-
-constexpr int kRow = BrickGrid::kWidth;
-constexpr int kPlane = kRow * kRow;
-
-/// Offset of the row at (y - 1 + j, z - 1 + k) from a cell's first stored sample (x - 1, y - 1, z - 1).
-constexpr int rowOffset(int j, int k) {
-  return k * kPlane + j * kRow;
-}
-
-/// What locating a point needs, taken out of the grid once per block.
-struct GridMap {
-  std::array<float, 9> linear;
-  std::array<float, 3> translation, low, high;
-  std::array<int, 3> first;
-  int countX, countY;
-  /// No rotation or shear: each index coordinate depends on one world coordinate.
-  bool diagonal;
-  const std::int32_t* table;
-  const float* values;
-  const std::uint16_t* codes;
-  const Interval* ranges;
-
-  /// Samples as floats, or the codes of a packed grid.
-  template <class Sample>
-  const Sample* samples() const {
-    if constexpr (std::is_same_v<Sample, float>)
-      return values;
-    else
-      return codes;
-  }
-};
-
-float notBelow(double v) {
-  const float f = float(v);
-  return f < v ? std::nextafter(f, HUGE_VALF) : f;
-}
-
-GridMap mapOf(const BrickGrid& grid) {
-  const Mat3f& m = grid.worldToIndex.linear;
-  const Vec3f& t = grid.worldToIndex.translation;
-  GridMap map{m.m,
-              {t.x, t.y, t.z},
-              {},
-              {},
-              {},
-              grid.brickCount.x,
-              grid.brickCount.y,
-              true,
-              grid.table.data(),
-              grid.values.data(),
-              grid.codes.data(),
-              grid.ranges.data()};
-  for (int axis = 0; axis < 3; ++axis) {
-    map.first[axis] = grid.firstBrick[axis];
-    map.low[axis] = notBelow(8.0 * grid.firstBrick[axis]);
-    map.high[axis] = -notBelow(-8.0 * (double(grid.firstBrick[axis]) + grid.brickCount[axis]));
-    for (int column = 0; column < 3; ++column)
-      if (column != axis && m(axis, column) != 0) map.diagonal = false;
-  }
-  return map;
-}
-
-/// The cell of a point: its fractions and the stored sample one before its corner in x, y and z.
-template <class Sample>
-struct Cell {
-  float fx, fy, fz;
-  const Sample* corner;
-  BrickCode code;
-
-  Cell(const GridMap& map, const float (&f)[3], std::size_t pool, int offset)
-      : fx(f[0]),
-        fy(f[1]),
-        fz(f[2]),
-        corner(map.samples<Sample>() + pool * BrickGrid::kVolume + offset),
-        code(brickCode(map.ranges[pool])) {}
-
-  float decoded(float value) const {
-    return std::is_same_v<Sample, float> ? value : code.low + code.unit * value;
-  }
-  float decodedSlope(float slope) const { return std::is_same_v<Sample, float> ? slope : code.unit * slope; }
-};
-
-template <class Sample>
-Cell<Sample> locate(const GridMap& map, float x, float y, float z) {
-  const auto& m = map.linear;
-  const auto& t = map.translation;
-  float q[3];
-  if (map.diagonal) {
-    q[0] = m[0] * x + t[0], q[1] = m[4] * y + t[1], q[2] = m[8] * z + t[2];
-  } else {
-    for (int a = 0; a < 3; ++a) q[a] = m[3 * a] * x + m[3 * a + 1] * y + m[3 * a + 2] * z + t[a];
-  }
-  for (int a = 0; a < 3; ++a)
-    if (!(q[a] >= map.low[a] && q[a] < map.high[a])) return {map, {0, 0, 0}, 0, 0};
-  int brick[3], local[3];
-  float f[3];
-  for (int a = 0; a < 3; ++a) {
-    const float cell = std::floor(q[a]);
-    f[a] = q[a] - cell;
-    brick[a] = brickOf(int(cell)) - map.first[a];
-    local[a] = insideBrick(int(cell));
-  }
-  const std::size_t pool =
-      std::size_t(map.table[(std::size_t(brick[2]) * map.countY + brick[1]) * map.countX + brick[0]]);
-  return {map, f, pool, (local[2] * kRow + local[1]) * kRow + local[0]};
-}
-
-float lerp(float a, float b, float f) {
-  return a + f * (b - a);
-}
-
-/// A gradient with respect to index coordinates as one with respect to the world, point `i` of the lanes.
-void storeGradient(const GridMap& map, const std::array<float, 3>& g, const BlockLanes<3>& grads, int i) {
-  const auto& m = map.linear;
-  for (int a = 0; a < 3; ++a)
-    grads[a][i] = map.diagonal ? m[4 * a] * g[a] : m[a] * g[0] + m[3 + a] * g[1] + m[6 + a] * g[2];
-}
-
-/// Catmull-Rom as offsets from the second of four samples: its own weight is one less the others, so that
-/// constants stay exact.
-struct CubicWeights {
-  float w0, w2, w3;
-
-  float operator()(float p0, float p1, float p2, float p3) const { return p1 + offset(p0, p1, p2, p3); }
-  float offset(float p0, float p1, float p2, float p3) const {
-    return w0 * (p0 - p1) + w2 * (p2 - p1) + w3 * (p3 - p1);
-  }
-};
-
-CubicWeights cubicWeights(float t) {
-  const float h = 0.5f * t, s = 1.0f - t;
-  return {-(h * s) * s, h * (1.0f + t * (4.0f - 3.0f * t)), -(h * t) * s};
-}
-
-CubicWeights cubicSlopes(float t) {
-  return {0.5f * (t * (4.0f - 3.0f * t) - 1.0f), 0.5f * (1.0f + t * (8.0f - 9.0f * t)),
-          0.5f * (t * (3.0f * t - 2.0f))};
-}
-
-bool fillIfEmpty(const BrickGrid& grid, const PointBlock& points, float* values, const BlockLanes<3>* grads) {
-  if (!grid.table.empty()) return false;
-  std::fill_n(values, points.paddedCount(), grid.background);
-  if (grads)
-    for (float* lane : *grads) std::fill_n(lane, points.paddedCount(), 0.0f);
-  return true;
-}
-
-template <class Sample>
-void trilinearLoop(const GridMap& map, const PointBlock& points, float* values) {
-  for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    float plane[2];
-    for (int k = 0; k < 2; ++k) {
-      const Sample* a = cell.corner + rowOffset(1, k + 1);
-      const Sample* b = cell.corner + rowOffset(2, k + 1);
-      plane[k] = lerp(lerp(a[1], a[2], cell.fx), lerp(b[1], b[2], cell.fx), cell.fy);
-    }
-    values[i] = cell.decoded(lerp(plane[0], plane[1], cell.fz));
-  }
-}
-
-template <class Sample>
-void trilinearGradLoop(const GridMap& map, const PointBlock& points, float* values,
-                       const BlockLanes<3>& grads) {
-  for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    const float fx = cell.fx, fy = cell.fy, fz = cell.fz;
-    // r[k][j] and dx[k][j]: the rows at z - 1 + k, y - 1 + j, interpolated in x, and their difference along
-    // x.
-    float r[4][4] = {}, dx[4][4] = {};
-    for (int k = 0; k < 4; ++k)
-      for (int j = 0; j < 4; ++j) {
-        const Sample* row = cell.corner + rowOffset(j, k);
-        r[k][j] = lerp(row[1], row[2], fx);
-        dx[k][j] = lerp(float(row[2]) - float(row[0]), float(row[3]) - float(row[1]), fx);
-      }
-    const auto alongY = [&](int k) { return lerp(r[k][2] - r[k][0], r[k][3] - r[k][1], fy); };
-    const auto alongZ = [&](int j) { return lerp(r[2][j] - r[0][j], r[3][j] - r[1][j], fz); };
-    values[i] = cell.decoded(lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz));
-    const float half = cell.decodedSlope(0.5f);
-    storeGradient(map,
-                  {half * lerp(lerp(dx[1][1], dx[1][2], fy), lerp(dx[2][1], dx[2][2], fy), fz),
-                   half * lerp(alongY(1), alongY(2), fz), half * lerp(alongZ(1), alongZ(2), fy)},
-                  grads, i);
-  }
-}
-
-/// The stored sample at a cell's corner, counted from the one before it.
-constexpr int kCorner = rowOffset(1, 1) + 1;
-
-/// A map by which the cell of a point is that of its nearest voxel.
-GridMap nearestMapOf(const BrickGrid& grid) {
-  GridMap map = mapOf(grid);
-  for (float& t : map.translation) t += 0.5f;
-  return map;
-}
-
-template <class Sample>
-void nearestLoop(const GridMap& map, const PointBlock& points, float* values) {
-  for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    values[i] = cell.decoded(cell.corner[kCorner]);
-  }
-}
-
-template <class Sample>
-void tricubicLoop(const GridMap& map, const PointBlock& points, float* values) {
-  for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
-    float plane[4];
-    for (int k = 0; k < 4; ++k) {
-      float row[4];
-      for (int j = 0; j < 4; ++j) {
-        const Sample* s = cell.corner + rowOffset(j, k);
-        row[j] = wx(s[0], s[1], s[2], s[3]);
-      }
-      plane[k] = wy(row[0], row[1], row[2], row[3]);
-    }
-    values[i] = cell.decoded(wz(plane[0], plane[1], plane[2], plane[3]));
-  }
-}
-
-template <class Sample>
-void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* values,
-                      const BlockLanes<3>& grads) {
-  for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
-    const CubicWeights sx = cubicSlopes(cell.fx), sy = cubicSlopes(cell.fy), sz = cubicSlopes(cell.fz);
-    float v[4], dx[4], dy[4];
-    for (int k = 0; k < 4; ++k) {
-      float row[4], slope[4];
-      for (int j = 0; j < 4; ++j) {
-        const Sample* s = cell.corner + rowOffset(j, k);
-        row[j] = wx(s[0], s[1], s[2], s[3]);
-        slope[j] = sx.offset(s[0], s[1], s[2], s[3]);
-      }
-      v[k] = wy(row[0], row[1], row[2], row[3]);
-      dx[k] = wy(slope[0], slope[1], slope[2], slope[3]);
-      dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
-    }
-    values[i] = cell.decoded(wz(v[0], v[1], v[2], v[3]));
-    storeGradient(
-        map,
-        {cell.decodedSlope(wz(dx[0], dx[1], dx[2], dx[3])), cell.decodedSlope(wz(dy[0], dy[1], dy[2], dy[3])),
-         cell.decodedSlope(sz.offset(v[0], v[1], v[2], v[3]))},
-        grads, i);
-  }
-}
-
-}  // namespace
-
-void sampleNearestScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.isPacked() ? nearestLoop<std::uint16_t> : nearestLoop<float>)(nearestMapOf(grid), points, values);
-}
-
-void sampleTrilinearScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.isPacked() ? trilinearLoop<std::uint16_t> : trilinearLoop<float>)(mapOf(grid), points, values);
-}
-
-void sampleTrilinearGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
-                               const BlockLanes<3>& grads) {
-  if (fillIfEmpty(grid, points, values, &grads)) return;
-  (grid.isPacked() ? trilinearGradLoop<std::uint16_t> : trilinearGradLoop<float>)(mapOf(grid), points, values,
-                                                                                  grads);
-}
-
-void sampleTricubicScalar(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.isPacked() ? tricubicLoop<std::uint16_t> : tricubicLoop<float>)(mapOf(grid), points, values);
-}
-
-void sampleTricubicGradScalar(const BrickGrid& grid, const PointBlock& points, float* values,
-                              const BlockLanes<3>& grads) {
-  if (fillIfEmpty(grid, points, values, &grads)) return;
-  (grid.isPacked() ? tricubicGradLoop<std::uint16_t> : tricubicGradLoop<float>)(mapOf(grid), points, values,
-                                                                                grads);
-}
-
-}  // namespace nephele
-
-#endif  // NEPHELE_GRID_KERNELS_ONCE
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele {
@@ -324,27 +32,33 @@ namespace HWY_NAMESPACE {
 // Reading rows takes vectors of a size known when compiling; others use the plain loops.
 #if HWY_HAVE_SCALABLE || HWY_TARGET == HWY_SCALAR
 
-void nearest(const BrickGrid& grid, const PointBlock& points, float* values) {
+void nearest(const GridView& grid, const PointBlock& points, float* values) {
   sampleNearestScalar(grid, points, values);
 }
-void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
+void trilinear(const GridView& grid, const PointBlock& points, float* values) {
   sampleTrilinearScalar(grid, points, values);
 }
-void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+void trilinearGrad(const GridView& grid, const PointBlock& points, float* values,
                    const BlockLanes<3>& grads) {
   sampleTrilinearGradScalar(grid, points, values, grads);
 }
-void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
+void tricubic(const GridView& grid, const PointBlock& points, float* values) {
   sampleTricubicScalar(grid, points, values);
 }
-void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
-                  const BlockLanes<3>& grads) {
+void tricubicGrad(const GridView& grid, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
   sampleTricubicGradScalar(grid, points, values, grads);
 }
 
 #else
 
 namespace hn = hwy::HWY_NAMESPACE;
+using detail::GridMap;
+using detail::kCorner;
+using detail::kPlane;
+using detail::kRow;
+using detail::mapOf;
+using detail::nearestMapOf;
+using detail::rowOffset;
 using D = hn::CappedTag<float, 16>;
 using V = hn::Vec<D>;
 using DI = hn::RebindToSigned<D>;
@@ -420,7 +134,7 @@ HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cell
   if constexpr (!std::is_same_v<Sample, float>) {
     // As brickCode.
     cells.low = hn::Load(d, low);
-    cells.unit = (hn::Load(d, high) - cells.low) / set(BrickCode::kLargest);
+    cells.unit = (hn::Load(d, high) - cells.low) / set(PackedGrid::Code::kLargest);
   }
 }
 
@@ -641,24 +355,21 @@ void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values,
   });
 }
 
-void nearest(const BrickGrid& grid, const PointBlock& points, float* values) {
-  (grid.isPacked() ? nearestOf<std::uint16_t> : nearestOf<float>)(nearestMapOf(grid), points, values);
+void nearest(const GridView& grid, const PointBlock& points, float* values) {
+  (grid.codes ? nearestOf<std::uint16_t> : nearestOf<float>)(nearestMapOf(grid), points, values);
 }
-void trilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
-  (grid.isPacked() ? trilinearOf<std::uint16_t> : trilinearOf<float>)(mapOf(grid), points, values);
+void trilinear(const GridView& grid, const PointBlock& points, float* values) {
+  (grid.codes ? trilinearOf<std::uint16_t> : trilinearOf<float>)(mapOf(grid), points, values);
 }
-void trilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+void trilinearGrad(const GridView& grid, const PointBlock& points, float* values,
                    const BlockLanes<3>& grads) {
-  (grid.isPacked() ? trilinearGradOf<std::uint16_t> : trilinearGradOf<float>)(mapOf(grid), points, values,
-                                                                              grads);
+  (grid.codes ? trilinearGradOf<std::uint16_t> : trilinearGradOf<float>)(mapOf(grid), points, values, grads);
 }
-void tricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
-  (grid.isPacked() ? tricubicOf<std::uint16_t> : tricubicOf<float>)(mapOf(grid), points, values);
+void tricubic(const GridView& grid, const PointBlock& points, float* values) {
+  (grid.codes ? tricubicOf<std::uint16_t> : tricubicOf<float>)(mapOf(grid), points, values);
 }
-void tricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
-                  const BlockLanes<3>& grads) {
-  (grid.isPacked() ? tricubicGradOf<std::uint16_t> : tricubicGradOf<float>)(mapOf(grid), points, values,
-                                                                            grads);
+void tricubicGrad(const GridView& grid, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
+  (grid.codes ? tricubicGradOf<std::uint16_t> : tricubicGradOf<float>)(mapOf(grid), points, values, grads);
 }
 
 #endif
@@ -676,27 +387,30 @@ HWY_EXPORT(trilinearGrad);
 HWY_EXPORT(tricubic);
 HWY_EXPORT(tricubicGrad);
 
-void sampleNearest(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(nearest)(grid, points, values);
+void sampleNearest(const GridView& grid, const PointBlock& points, float* values) {
+  if (!detail::fillIfEmpty(grid, points, values, nullptr))
+    HWY_DYNAMIC_DISPATCH(nearest)(grid, points, values);
 }
 
-void sampleTrilinear(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(trilinear)(grid, points, values);
+void sampleTrilinear(const GridView& grid, const PointBlock& points, float* values) {
+  if (!detail::fillIfEmpty(grid, points, values, nullptr))
+    HWY_DYNAMIC_DISPATCH(trilinear)(grid, points, values);
 }
 
-void sampleTrilinearGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+void sampleTrilinearGrad(const GridView& grid, const PointBlock& points, float* values,
                          const BlockLanes<3>& grads) {
-  if (!fillIfEmpty(grid, points, values, &grads))
+  if (!detail::fillIfEmpty(grid, points, values, &grads))
     HWY_DYNAMIC_DISPATCH(trilinearGrad)(grid, points, values, grads);
 }
 
-void sampleTricubic(const BrickGrid& grid, const PointBlock& points, float* values) {
-  if (!fillIfEmpty(grid, points, values, nullptr)) HWY_DYNAMIC_DISPATCH(tricubic)(grid, points, values);
+void sampleTricubic(const GridView& grid, const PointBlock& points, float* values) {
+  if (!detail::fillIfEmpty(grid, points, values, nullptr))
+    HWY_DYNAMIC_DISPATCH(tricubic)(grid, points, values);
 }
 
-void sampleTricubicGrad(const BrickGrid& grid, const PointBlock& points, float* values,
+void sampleTricubicGrad(const GridView& grid, const PointBlock& points, float* values,
                         const BlockLanes<3>& grads) {
-  if (!fillIfEmpty(grid, points, values, &grads))
+  if (!detail::fillIfEmpty(grid, points, values, &grads))
     HWY_DYNAMIC_DISPATCH(tricubicGrad)(grid, points, values, grads);
 }
 

@@ -298,10 +298,10 @@ VoxelGrid<Vec3f> voxelsOf(const openvdb::Vec3SGrid& grid) {
 
 TreeValues TreeValues::levelSet(const BrickGrid& bricks, const std::string& name) {
   // Where the band ends earlier on the inside, it ends there on both sides.
-  float halfWidth = -bricks.background;
-  for (const Interval& r : bricks.ranges)
+  float halfWidth = -bricks.background();
+  for (const Interval& r : bricks.ranges())
     if (r.isPoint() && r.min > 0.0f) halfWidth = std::min(halfWidth, r.min);
-  return levelSetOf(bricks.background, halfWidth, name);
+  return levelSetOf(bricks.background(), halfWidth, name);
 }
 
 TreeValues TreeValues::levelSet(const VoxelGrid<float>& voxels, const std::string& name) {
@@ -330,11 +330,11 @@ openvdb::FloatGrid::Ptr toOpenVdb(const BrickGrid& bricks, const TreeValues& val
                                   const std::string& name) {
   initializeOpenVdb();
   auto grid = openvdb::FloatGrid::create(values.background);
-  grid->setTransform(transformOf(latticeOf(bricks), double(bricks.voxelSize)));
-  assembleTree(grid->tree(), bricks.firstBrick, bricks.brickCount,
+  grid->setTransform(transformOf(bricks.lattice(), double(bricks.voxelSize())));
+  assembleTree(grid->tree(), bricks.firstBrick(), bricks.brickCount(),
                [&](const Vec3i& brick, const openvdb::Coord& origin) {
-                 const std::int32_t pool = bricks.table[bricks.tableIndex(brick)];
-                 if (bricks.ranges[std::size_t(pool)].isPoint())
+                 const std::int32_t pool = bricks.table()[bricks.tableIndex(brick)];
+                 if (bricks.ranges()[std::size_t(pool)].isPoint())
                    return tileOf(bricks.brick(pool)[0], values, name);
                  return leafOfSamples(bricks.brick(pool) + sampleOffset(0, 0, 0), kWidth, kWidth * kWidth,
                                       origin, values, name);

@@ -20,7 +20,10 @@ class VoxelGrid {
  public:
   /// Voxel (i, j, k) stands at (i, j, k) * voxelSize. `maker` begins the messages of errors.
   VoxelGrid(const std::string& maker, double voxelSize, const Value& background)
-      : bricks_(maker), lattice_(latticeOf(voxelSize)), voxelSize_(voxelSize), constants_{background} {}
+      : bricks_(maker),
+        lattice_(Lattice::uniform(float(voxelSize))),
+        voxelSize_(voxelSize),
+        constants_{background} {}
   VoxelGrid(const std::string& maker, const Lattice& lattice, const Value& background)
       : bricks_(maker), lattice_(lattice), voxelSize_(double(lattice.voxelSize)), constants_{background} {}
 
@@ -81,11 +84,6 @@ class VoxelGrid {
   void releaseSamples(std::size_t first, std::size_t last) { bricks_.release(first, last); }
 
  private:
-  static Lattice latticeOf(double voxelSize) {
-    const auto h = float(voxelSize);
-    return {{Mat3f::scaling(h), {}}, {Mat3f::scaling(1.0f / h), {}}, h};
-  }
-
   detail::SparseBricks<Value> bricks_;
   Lattice lattice_;
   double voxelSize_;

@@ -81,11 +81,10 @@ std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid) {
 }
 
 VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label) {
-  require(!bricks.isPacked(), "toVdb: the grid must not be packed");
   const detail::TreeValues values =
       label.gridClass == VdbGridInfo::Class::levelSet    ? detail::TreeValues::levelSet(bricks, label.name)
-      : label.gridClass == VdbGridInfo::Class::fogVolume ? fogValues(bricks.background, label.name)
-                                                         : detail::TreeValues::asTheyAre(bricks.background);
+      : label.gridClass == VdbGridInfo::Class::fogVolume ? fogValues(bricks.background(), label.name)
+                                                         : detail::TreeValues::asTheyAre(bricks.background());
   return labelled(detail::toOpenVdb(bricks, values, label.name), label);
 }
 

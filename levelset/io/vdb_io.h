@@ -106,7 +106,7 @@ void copyMetadata(const VdbGrid& from, VdbGrid& to);
 /// OpenVDB form of bricks. Class level set: sign flips (negative inside), background is half-width x voxel
 /// size, voxels inside the band are active. Class fog volume: voxels with a value > 0 are active, background
 /// 0; constant bricks become tiles.
-/// @throws Error naming the grid if it is packed, a value is not finite, or its background does not fit its
+/// @throws Error naming the grid if a value is not finite, or its background does not fit its
 /// class.
 VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label);
 /// The same of voxels. Those that are handed over give their memory back while the tree takes it.

@@ -37,10 +37,10 @@ std::array<VdbGrid, 3> components(const VectorGrid& grid) {
 
 /// A box around the bricks of all three.
 BrickBox boxOf(const VectorGrids& grids) {
-  Vec3i first = grids[0]->firstBrick, end = first + grids[0]->brickCount;
+  Vec3i first = grids[0]->firstBrick(), end = first + grids[0]->brickCount();
   for (const auto& grid : grids) {
-    first = min(first, grid->firstBrick);
-    end = max(end, grid->firstBrick + grid->brickCount);
+    first = min(first, grid->firstBrick());
+    end = max(end, grid->firstBrick() + grid->brickCount());
   }
   return {first, end - first};
 }
@@ -58,9 +58,9 @@ std::array<VdbGrid, 3> vectorComponents(const VdbGrid& handle) {
 VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label) {
   detail::initializeOpenVdb();
   const bool isStaggered = label.gridClass == VdbGridInfo::Class::staggered;
-  Lattice lattice = latticeOf(*grids[0]);
+  Lattice lattice = grids[0]->lattice();
   if (isStaggered) lattice.indexToWorld.translation += lattice.indexToWorld.linear * Vec3f{0.5f, 0, 0};
-  const openvdb::Vec3s background(grids[0]->background, grids[1]->background, grids[2]->background);
+  const openvdb::Vec3s background(grids[0]->background(), grids[1]->background(), grids[2]->background());
   const auto grid = openvdb::Vec3SGrid::create(background);
   grid->setTransform(detail::transformOf(lattice, double(lattice.voxelSize)));
   grid->setName(label.name);

@@ -25,8 +25,7 @@ Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
   require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + std::to_string(isovalue));
   require(adaptivity >= 0 && adaptivity <= 1,
           "adaptiveMesh: adaptivity must be in [0, 1], got " + std::to_string(adaptivity));
-  require(!grid.isPacked(), "adaptiveMesh: the grid must not be packed");
-  const auto values = detail::toOpenVdb(grid, detail::TreeValues::negated(grid.background), "");
+  const auto values = detail::toOpenVdb(grid, detail::TreeValues::negated(grid.background()), "");
   values->setGridClass(openvdb::GRID_LEVEL_SET);
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;

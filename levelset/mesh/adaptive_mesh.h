@@ -11,7 +11,7 @@ namespace nephele {
 /// The inside is where values exceed `isovalue`. `adaptivity` goes from 0 (one vertex per cell) to 1.
 /// Oriented outward. With adaptivity > 0, and on surfaces that the grid does not resolve, edges with more
 /// than two faces are possible.
-/// @throws Error if adaptivity is outside [0, 1], isovalue or a value is not finite, or the grid is packed.
+/// @throws Error if adaptivity is outside [0, 1], isovalue or a value is not finite.
 Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity);
 
 }  // namespace nephele

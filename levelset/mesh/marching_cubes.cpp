@@ -75,14 +75,14 @@ class Mesher {
   Mesher(const BrickGrid& grid, float isovalue)
       : grid_(grid), isovalue_(isovalue), table_(CellTable::instance()) {
     sides_.reserve(grid.poolSize());
-    for (const Interval& range : grid.ranges) {
+    for (const Interval& range : grid.ranges()) {
       const bool inside = range.max > isovalue;
       const bool outside = !(range.min > isovalue);
       sides_.push_back(std::uint8_t((inside ? kInside : 0) | (outside ? kOutside : 0)));
     }
-    for (int i = 0; i < 9; ++i) linear_[i] = grid.indexToWorld.linear.m[i];
-    translation_ = Vec3d(grid.indexToWorld.translation);
-    mirrored_ = determinant(grid.indexToWorld.linear) < 0;
+    for (int i = 0; i < 9; ++i) linear_[i] = grid.indexToWorld().linear.m[i];
+    translation_ = Vec3d(grid.indexToWorld().translation);
+    mirrored_ = determinant(grid.indexToWorld().linear) < 0;
   }
 
   Mesh run(const Progress& progress) {
@@ -104,11 +104,11 @@ class Mesher {
  private:
   // Rows of bricks along x, from the layer before the table on.
   std::size_t rowCount() const {
-    return std::size_t(grid_.brickCount.y + 1) * std::size_t(grid_.brickCount.z + 1);
+    return std::size_t(grid_.brickCount().y + 1) * std::size_t(grid_.brickCount().z + 1);
   }
   std::size_t rowOf(const Vec3i& b) const {
-    return std::size_t(b.z - grid_.firstBrick.z + 1) * std::size_t(grid_.brickCount.y + 1) +
-           std::size_t(b.y - grid_.firstBrick.y + 1);
+    return std::size_t(b.z - grid_.firstBrick().z + 1) * std::size_t(grid_.brickCount().y + 1) +
+           std::size_t(b.y - grid_.firstBrick().y + 1);
   }
 
   void findBricks(const Progress& progress) {
@@ -132,11 +132,11 @@ class Mesher {
   void findBricksInRow(std::size_t row, std::vector<SurfaceBrick>& found) const {
     Samples samples;
     SignRows signs;
-    const int rowsPerLayer = grid_.brickCount.y + 1;
-    Vec3i b{0, grid_.firstBrick.y - 1 + int(row) % rowsPerLayer,
-            grid_.firstBrick.z - 1 + int(row) / rowsPerLayer};
-    for (int x = -1; x < grid_.brickCount.x; ++x) {
-      b.x = grid_.firstBrick.x + x;
+    const int rowsPerLayer = grid_.brickCount().y + 1;
+    Vec3i b{0, grid_.firstBrick().y - 1 + int(row) % rowsPerLayer,
+            grid_.firstBrick().z - 1 + int(row) / rowsPerLayer};
+    for (int x = -1; x < grid_.brickCount().x; ++x) {
+      b.x = grid_.firstBrick().x + x;
       if (!mayCross(b)) continue;
       gather(b, samples);
       // Ranges do not show NaN, so a neighbour could miss the surface about it.
@@ -154,7 +154,7 @@ class Mesher {
   bool mayCross(const Vec3i& b) const {
     const std::int32_t pool = grid_.poolIndex(b);
     unsigned sides = sides_[pool];
-    const Interval& own = grid_.ranges[pool];
+    const Interval& own = grid_.ranges()[pool];
     if (own.min < own.max) return sides == kBoth;
     for (int i = 1; i < 8; ++i) {
       sides |= sides_[grid_.poolIndex({b.x + (i & 1), b.y + (i >> 1 & 1), b.z + (i >> 2)})];
@@ -265,7 +265,7 @@ class Mesher {
 
   // Null where the surface does not cross the brick.
   const SurfaceBrick* findBrick(const Vec3i& b) const {
-    const Vec3i last = grid_.firstBrick + grid_.brickCount;
+    const Vec3i last = grid_.firstBrick() + grid_.brickCount();
     if (b.x >= last.x || b.y >= last.y || b.z >= last.z) return nullptr;
     const std::size_t row = rowOf(b);
     const auto end = bricks_.begin() + std::ptrdiff_t(rowStart_[row + 1]);
@@ -368,13 +368,7 @@ class Mesher {
 }  // namespace
 
 Mesh marchingCubes(const BrickGrid& grid, float isovalue, const Progress& progress) {
-  require(!grid.isPacked(), "marchingCubes: the grid must not be packed");
   require(std::isfinite(isovalue), "marchingCubes: isovalue must be finite, got " + std::to_string(isovalue));
-  const Vec3i& count = grid.brickCount;
-  require(count.x >= 0 && count.y >= 0 && count.z >= 0 &&
-              grid.table.size() == std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z) &&
-              grid.poolSize() > 0 && grid.values.size() == grid.poolSize() * BrickGrid::kVolume,
-          "marchingCubes: the grid's table and pool do not fit its size");
   return Mesher(grid, isovalue).run(progress);
 }
 

@@ -23,8 +23,8 @@ namespace nephele {
 ///
 /// Positions are computed in double precision, by indexToWorld. Cost and memory grow with the bricks that the
 /// surface crosses; all cores; the same mesh at any thread count.
-/// @throws Error if isovalue is not finite, samples near the surface are NaN, the table or pool do not fit
-/// the grid's size, or the surface has more than 1.4 billion triangles; Cancelled.
+/// @throws Error if isovalue is not finite, samples near the surface are NaN, or the surface has more
+/// than 1.4 billion triangles; Cancelled.
 Mesh marchingCubes(const BrickGrid& grid, float isovalue = 0.0f, const Progress& progress = silent());
 
 }  // namespace nephele

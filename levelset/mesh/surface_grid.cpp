@@ -96,20 +96,14 @@ void sampleBrick(const ScalarField& field, float h, const Vec3i& brick, std::spa
 std::shared_ptr<BrickGrid> sampledNear(const ScalarField& field, const ScalarField& beyond,
                                        const NearestOnMesh& mesh, float h, float reach,
                                        const SampleBrick& sample, const Progress& progress) {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->indexToWorld.linear = Mat3f::scaling(h);
-  grid->worldToIndex.linear = Mat3f::scaling(1 / h);
-  grid->voxelSize = h;
-  grid->background = kNan;
   const std::vector<Vec3i> bricks = bricksNear(mesh, h, reach, progress);
-  Vec3i last = grid->firstBrick = bricks.front();
+  Vec3i first = bricks.front(), last = first;
   for (const Vec3i& b : bricks) {
-    grid->firstBrick = min(grid->firstBrick, b);
+    first = min(first, b);
     last = max(last, b);
   }
-  grid->brickCount = last - grid->firstBrick + Vec3i{1, 1, 1};
-  grid->table.assign(
-      std::size_t(grid->brickCount.x) * std::size_t(grid->brickCount.y) * std::size_t(grid->brickCount.z), 0);
+  auto grid =
+      std::make_shared<BrickGrid>(Lattice::uniform(h), BrickBox{first, last - first + Vec3i{1, 1, 1}}, kNan);
 
   // Bricks of one value share one sample brick.
   std::vector<float> constants(bricks.size(), kNan);
@@ -124,30 +118,26 @@ std::shared_ptr<BrickGrid> sampledNear(const ScalarField& field, const ScalarFie
         }
       },
       progress);
-  std::int32_t pool = 1;
   std::map<float, std::int32_t> poolOfConstant;
   std::vector<std::size_t> varying;
   for (std::size_t i = 0; i < bricks.size(); ++i) {
-    std::int32_t& entry = grid->table[grid->tableIndex(bricks[i])];
     if (std::isnan(constants[i])) {
-      entry = pool++;
       varying.push_back(i);
-    } else {
-      const auto [found, added] = poolOfConstant.try_emplace(constants[i], pool);
-      pool += added;
-      entry = found->second;
+      continue;
     }
+    const auto [found, isNew] = poolOfConstant.try_emplace(constants[i], 0);
+    if (isNew) found->second = grid->appendConstant(constants[i]);
+    grid->place(bricks[i], found->second);
   }
-  resizeLarge(grid->values, std::size_t(pool) * BrickGrid::kVolume);
-  grid->ranges.resize(std::size_t(pool));
-  std::fill_n(grid->brick(0), BrickGrid::kVolume, kNan);
+  const std::int32_t firstVarying = grid->append(varying.size());
+  for (std::size_t i = 0; i < varying.size(); ++i)
+    grid->place(bricks[varying[i]], firstVarying + std::int32_t(i));
   const auto fillConstants = [&] {
     for (const auto& [value, index] : poolOfConstant) {
       std::fill_n(grid->brick(index), BrickGrid::kVolume, value);
-      grid->ranges[std::size_t(index)] = Interval::of(value);
+      grid->setRange(index, Interval::of(value));
     }
   };
-  fillConstants();
 
   // Back and forth: each closest point is a tight bound for the next.
   std::vector<int> own;
@@ -155,7 +145,7 @@ std::shared_ptr<BrickGrid> sampledNear(const ScalarField& field, const ScalarFie
   for (int z = 0; z < kBrick; ++z)
     for (int y = 0; y < kBrick; ++y)
       for (int x = 0; x < kBrick; ++x) own.push_back(sampleOffset(turning(x, y), turning(y, z), z));
-  const auto poolAt = [&](std::size_t i) { return grid->table[grid->tableIndex(bricks[varying[i]])]; };
+  const auto poolAt = [&](std::size_t i) { return firstVarying + std::int32_t(i); };
   parallelFor(
       varying.size(), 4,
       [&](std::size_t begin, std::size_t end) {
@@ -185,7 +175,7 @@ std::shared_ptr<BrickGrid> sampledNear(const ScalarField& field, const ScalarFie
           for (int s = 0; s < BrickGrid::kVolume; ++s)
             if (std::isnan(samples[s])) missing.push_back(s);
           if (!missing.empty()) sampleBrick(beyond, h, bricks[varying[i]], missing, samples);
-          grid->ranges[std::size_t(poolAt(i))] = rangeOfBrick(samples);
+          grid->setRange(poolAt(i), rangeOfBrick(samples));
         }
       },
       progress);
@@ -218,7 +208,7 @@ class GriddedNode final : public FieldNode<float> {
   }
   Interval range(const Box& box, RangeMemo& memo) const override {
     // Interpolation reads no farther than this.
-    const Interval near = memo.of(elsewhere_, box.expanded(2 * grid_->voxelSize));
+    const Interval near = memo.of(elsewhere_, box.expanded(2 * grid_->voxelSize()));
     if (near.isPoint()) return near;
     constexpr float kRounding = 2e-6f;
     const float beyond = kRounding * near.magnitude();
@@ -227,7 +217,7 @@ class GriddedNode final : public FieldNode<float> {
   NodePtr<float> restricted(Restriction& restriction) const override {
     return constantFrom<float>(range(restriction.box, restriction.memo.ranges));
   }
-  float differenceStep() const override { return grid_->voxelSize; }
+  float differenceStep() const override { return grid_->voxelSize(); }
 
  private:
   struct Missing {

@@ -46,44 +46,39 @@ WarpBricks::WarpBricks(const ScalarField& object, const Box& box, const WarpGrid
   const Vec3d centre(box.center());
   constexpr double kFar = 1000;
   const Vec3d origin = length(centre) > kFar * std::max(double(box.longestSide()), h) ? centre : Vec3d{};
-  layout_.voxelSize = float(h);
-  layout_.indexToWorld = {Mat3f::scaling(float(h)), Vec3f(origin)};
-  layout_.worldToIndex = inverse(layout_.indexToWorld);
+  const Affine map{Mat3f::scaling(float(h)), Vec3f(origin)};
+  lattice_ = {map, inverse(map), float(h)};
   double count = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = (double(box.min[axis]) - across - origin[axis]) / h,
                  high = (double(box.max[axis]) + across - origin[axis]) / h;
     require(std::abs(low) < 1e7 && std::abs(high) < 1e7,
             fmt::format("warp grid: voxels of {:g} are too small for the object", h));
-    layout_.firstBrick[axis] = brickOf(int(std::floor(low)));
-    layout_.brickCount[axis] = brickOf(int(std::ceil(high))) - layout_.firstBrick[axis] + 1;
-    count *= layout_.brickCount[axis];
+    box_.first[axis] = brickOf(int(std::floor(low)));
+    box_.count[axis] = brickOf(int(std::ceil(high))) - box_.first[axis] + 1;
+    count *= box_.count[axis];
   }
   require(count < 2e9, fmt::format("warp grid: voxels of {:g} are too small for the object", h));
   bound_ = float(across);
 
-  const auto nx = std::size_t(layout_.brickCount.x), ny = std::size_t(layout_.brickCount.y);
-  layout_.table.resize(std::size_t(count));
-  const auto brickAtEntry = [&](std::size_t i) {
-    return layout_.firstBrick + Vec3i{int(i % nx), int(i / nx % ny), int(i / nx / ny)};
-  };
+  table_.resize(box_.size());
   const float near = float(across + kHalfDiagonal * h);
-  parallelFor(layout_.table.size(), 256, [&](std::size_t begin, std::size_t end) {
+  parallelFor(table_.size(), 256, [&](std::size_t begin, std::size_t end) {
     const std::size_t n = end - begin;
     std::vector<float> x(n), y(n), z(n), value(n);
     for (std::size_t i = 0; i < n; ++i) {
-      const Vec3f middle = Vec3f(brickAtEntry(begin + i)) * float(kBrick) + Vec3f{3.5f, 3.5f, 3.5f};
-      const Vec3f p = layout_.indexToWorld(middle);
+      const Vec3f middle = Vec3f(box_.at(begin + i)) * float(kBrick) + Vec3f{3.5f, 3.5f, 3.5f};
+      const Vec3f p = lattice_.indexToWorld(middle);
       x[i] = p.x, y[i] = p.y, z[i] = p.z;
     }
     object.eval({x, y, z}, value);
     for (std::size_t i = 0; i < n; ++i)
-      layout_.table[begin + i] = !(std::abs(value[i]) > near) ? -1 : value[i] > 0 ? 1 : 0;
+      table_[begin + i] = !(std::abs(value[i]) > near) ? -1 : value[i] > 0 ? 1 : 0;
   });
-  for (std::size_t i = 0; i < layout_.table.size(); ++i)
-    if (layout_.table[i] == -1) {
-      layout_.table[i] = std::int32_t(2 + places_.size());
-      places_.push_back(brickAtEntry(i));
+  for (std::size_t i = 0; i < table_.size(); ++i)
+    if (table_[i] == -1) {
+      table_[i] = std::int32_t(2 + places_.size());
+      places_.push_back(box_.at(i));
     }
 }
 
@@ -91,15 +86,11 @@ template <int N, class F>
 std::array<std::shared_ptr<BrickGrid>, N> WarpBricks::fill(const F& field, const Progress& progress) const {
   std::array<std::shared_ptr<BrickGrid>, N> grids;
   for (auto& grid : grids) {
-    grid = std::make_shared<BrickGrid>(layout_);
-    detail::resizeLarge(grid->values, (places_.size() + 2) * std::size_t(BrickGrid::kVolume));
-    grid->ranges.resize(places_.size() + 2);
-    grid->background = N == 1 ? -bound_ : 0.0f;
-    for (const std::int32_t constant : {0, 1}) {
-      const float value = N == 1 ? (constant == 1 ? bound_ : -bound_) : 0.0f;
-      std::fill_n(grid->brick(constant), BrickGrid::kVolume, value);
-      grid->ranges[std::size_t(constant)] = Interval::of(value);
-    }
+    grid = std::make_shared<BrickGrid>(lattice_, box_, N == 1 ? -bound_ : 0.0f);
+    grid->reserve(places_.size() + 2);
+    grid->appendConstant(N == 1 ? bound_ : 0.0f);
+    grid->append(places_.size());
+    grid->setTable(table_);
   }
   parallelFor(
       places_.size(), 4,
@@ -111,7 +102,7 @@ std::array<std::shared_ptr<BrickGrid>, N> WarpBricks::fill(const F& field, const
           for (int i = 0; i < kOwn; ++i) {
             const Vec3i voxel = Vec3i{places_[b].x * kBrick, places_[b].y * kBrick, places_[b].z * kBrick} +
                                 Vec3i{i & 7, i >> 3 & 7, i >> 6};
-            const Vec3f p = layout_.indexToWorld(Vec3f(voxel));
+            const Vec3f p = lattice_.indexToWorld(Vec3f(voxel));
             x[std::size_t(i)] = p.x, y[std::size_t(i)] = p.y, z[std::size_t(i)] = p.z;
           }
           if constexpr (N == 1)

@@ -42,8 +42,10 @@ class WarpBricks {
   template <int N, class F>
   std::array<std::shared_ptr<BrickGrid>, N> fill(const F& field, const Progress& progress) const;
 
-  /// All of a grid but its samples. Pool brick 0 is outside, 1 inside.
-  BrickGrid layout_;
+  Lattice lattice_;
+  BrickBox box_;
+  /// Of the bricks of the box: 0 is outside, 1 inside, 2 and more are `places_`.
+  std::vector<std::int32_t> table_;
   /// Bricks in the order of the pool, from 2.
   std::vector<Vec3i> places_;
   float bound_ = 0;

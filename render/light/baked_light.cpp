@@ -19,11 +19,11 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
       medium(itsMedium),
       lights(itsLights),
       octaves(itsOctaves),
-      voxelSize(volume.density().voxelSize),
-      toDensity(volume.density().worldToIndex, volume.density().firstBrick) {
+      voxelSize(volume.density().voxelSize()),
+      toDensity(volume.density().worldToIndex(), volume.density().firstBrick()) {
   const BrickGrid& grid = volume.density();
-  scene.density = {grid.values.data(), grid.table.data(), grid.brickCount};
-  scene.ranges = grid.ranges.data();
+  scene.density = {grid.values().data(), grid.table().data(), grid.brickCount()};
+  scene.ranges = grid.ranges().data();
   scene.emptiness = volume.emptiness().data();
   scene.uniformity = volume.uniformity().data();
   // The scene's extinction is that of the most opaque colour.
@@ -35,7 +35,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   const bool grey = medium.albedo.x == medium.albedo.y && medium.albedo.x == medium.albedo.z;
   takeLights();
   scene.colours = grey && !scene.isColoured() && !lights.map ? 1 : 3;
-  const Vec3f corner(grid.firstBrick * BrickGrid::kBrick);
+  const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
   const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
@@ -165,9 +165,9 @@ void BakedLight::addLocal(const LocalLight& light, const ProjectedLightVolume& s
 void BakedLight::setColours(const RenderVolume& volume, float most) {
   const auto set = [](const VolumeColour::Grids& grids, MarchScene::ColourBricks& bricks) {
     if (!grids[0]) return;
-    for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values.data();
-    bricks.table = grids[0]->table.data();
-    bricks.count = grids[0]->brickCount;
+    for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values().data();
+    bricks.table = grids[0]->table().data();
+    bricks.count = grids[0]->brickCount();
   };
   set(volume.colour().scattering, scene.colour);
   set(volume.colour().emission, scene.emission);

@@ -36,7 +36,7 @@ double densityAt(const BrickGrid& grid, const Vec3d& p) {
   const Vec3d floor{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
   const Vec3i cell{int(floor.x), int(floor.y), int(floor.z)};
   const std::int32_t pool = grid.poolIndex(brickOf(cell));
-  if (!(grid.ranges[std::size_t(pool)].max > 0)) return 0.0;
+  if (!(grid.ranges()[std::size_t(pool)].max > 0)) return 0.0;
   const Vec3f f(p - floor);
   const float* at =
       grid.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
@@ -139,7 +139,7 @@ DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const DistantLight& lig
                              const Options& options, const Progress& progress) {
   require(isFinite(light.direction) && length(light.direction) > 0,
           light.name + ": the direction towards it must be finite and not zero");
-  const double voxel = double(volume.density().voxelSize);
+  const double voxel = double(volume.density().voxelSize());
   const Vec3d way = -normalize(Vec3d(light.direction));
   const auto [right, up] = axesAcross(way);
   Vec3d low{INFINITY, INFINITY, INFINITY}, high = -low;
@@ -160,7 +160,7 @@ DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const DistantLight& lig
 
 DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const LocalLight& light, float extinction,
                              const Options& options, const Progress& progress) {
-  const double voxel = double(volume.density().voxelSize);
+  const double voxel = double(volume.density().voxelSize());
   const std::vector<Vec3d> points = outlineOf(volume);
   Vec3d low{INFINITY, INFINITY, INFINITY}, high = -low;
   for (const Vec3d& p : points) low = min(low, p), high = max(high, p);
@@ -202,7 +202,7 @@ void DeepShadowMap::make(const RenderVolume& volume, const Camera& camera, float
   image->height = camera.height();
   image->pixels.resize(std::size_t(image->width) * std::size_t(image->height));
   const Box bounds = volume.worldBounds();
-  const Affine& toIndex = grid.worldToIndex;
+  const Affine& toIndex = grid.worldToIndex();
   const auto index = [&](const Vec3d& p) {
     Vec3d q;
     for (int row = 0; row != 3; ++row)
@@ -225,7 +225,7 @@ void DeepShadowMap::make(const RenderVolume& volume, const Camera& camera, float
               far = std::min(far, std::max(a, b));
             }
             if (!(far > near) || std::isinf(far)) continue;
-            const int steps = std::max(1, int(std::ceil((far - near) / (0.5 * double(grid.voxelSize)))));
+            const int steps = std::max(1, int(std::ceil((far - near) / (0.5 * double(grid.voxelSize())))));
             const double step = (far - near) / steps, cosine = dot(ray.direction, camera.forward());
             Curve curve(double(options.tolerance),
                         image->pixels[y * std::size_t(image->width) + std::size_t(x)]);

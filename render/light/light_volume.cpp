@@ -99,7 +99,7 @@ struct LightVolume::Sweep {
       for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
         const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
-        const bool holds = grid.ranges[std::size_t(pool)].max > 0;
+        const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
         patch.empty = patch.empty && !holds;
         const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w] +
                             (insideBrick(u1) + 1) * sampleStride[u];
@@ -147,12 +147,12 @@ LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const
   require(isFinite(towards) && length(towards) > 0,
           "light: the direction towards it must be finite and not zero");
   const BrickGrid& grid = volume.density();
-  const Sweep sweep(grid, grid.worldToIndex.linear * normalize(towards));
+  const Sweep sweep(grid, grid.worldToIndex().linear * normalize(towards));
   Mat3f shear;
   shear(0, sweep.u) = shear(1, sweep.v) = shear(2, sweep.w) = 1;
   shear(0, sweep.w) = -sweep.slopeU;
   shear(1, sweep.w) = -sweep.slopeV;
-  worldToLattice_ = {shear * grid.worldToIndex.linear, shear * grid.worldToIndex.translation};
+  worldToLattice_ = {shear * grid.worldToIndex().linear, shear * grid.worldToIndex().translation};
   values_.assign(kVolume, 0.0f);
   if (volume.isEmpty()) return;
 

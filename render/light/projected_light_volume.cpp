@@ -82,7 +82,7 @@ struct ProjectedLightVolume::Sweep {
     const Vec3d floor{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
     const Vec3i cell{int(floor.x), int(floor.y), int(floor.z)};
     const std::int32_t pool = grid.poolIndex(brickOf(cell));
-    if (!(grid.ranges[std::size_t(pool)].max > 0)) return 0.0f;
+    if (!(grid.ranges()[std::size_t(pool)].max > 0)) return 0.0f;
     const Vec3f f(p - floor);
     constexpr int row = BrickGrid::kWidth, plane = row * row;
     const float* at =
@@ -178,7 +178,7 @@ ProjectedLightVolume::ProjectedLightVolume(const RenderVolume& volume, const Loc
 // Chooses the frame, the faces and their spacing, and numbers their bricks.
 void ProjectedLightVolume::place(const RenderVolume& volume, const LocalLight& light) {
   const BrickGrid& grid = volume.density();
-  const std::array<Vec3f, 8> box = corners(volume.indexBounds(), grid.indexToWorld);
+  const std::array<Vec3f, 8> box = corners(volume.indexBounds(), grid.indexToWorld());
   Vec3f middle;
   for (const Vec3f& corner : box) middle += corner * 0.125f;
   float widest = 0, side = length(box[7] - box[0]);
@@ -210,7 +210,7 @@ void ProjectedLightVolume::place(const RenderVolume& volume, const LocalLight& l
   }
   worldToFrame_.translation = -(worldToFrame_.linear * light.position);
   const Affine frameToWorld{transpose(worldToFrame_.linear), light.position};
-  frameToIndex_ = composed(grid.worldToIndex, frameToWorld);
+  frameToIndex_ = composed(grid.worldToIndex(), frameToWorld);
 
   const double budget = brickBudget(volume);
   std::array<std::size_t, 6> bricks{};
@@ -222,8 +222,8 @@ void ProjectedLightVolume::place(const RenderVolume& volume, const LocalLight& l
         deepest = std::max(deepest, face.side * worldToFrame_(corner)[face.axis]);
       // Faces that look away from the volume keep their brick of nothing.
       if (!(deepest > 0)) continue;
-      face.perDepth = 1 / grid.voxelSize;
-      face.perTangent = std::max(0.75f * deepest / (grid.voxelSize * coarseness), 4.0f);
+      face.perDepth = 1 / grid.voxelSize();
+      face.perTangent = std::max(0.75f * deepest / (grid.voxelSize() * coarseness), 4.0f);
       bricks[std::size_t(&face - faces_.data())] = findBricks(volume, face, tangent);
       stored += double(bricks[std::size_t(&face - faces_.data())]);
       entries += double(face.table.size());
@@ -236,7 +236,7 @@ void ProjectedLightVolume::place(const RenderVolume& volume, const LocalLight& l
 
 // Returns how many there are beside the brick of nothing.
 std::size_t ProjectedLightVolume::findBricks(const RenderVolume& volume, Face& face, float tangent) const {
-  const Affine indexToFrame = composed(worldToFrame_, volume.density().indexToWorld);
+  const Affine indexToFrame = composed(worldToFrame_, volume.density().indexToWorld());
   const int u = (face.axis + 1) % 3, v = (face.axis + 2) % 3;
   // Nodes beside the last ones are needed for differences and rounding.
   constexpr float slack = 1.01f;

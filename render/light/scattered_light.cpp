@@ -20,9 +20,9 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/anderson.h"
-#include "nephele/render/light/detail/exp_of_minus.h"
 #include "nephele/render/light/detail/light_sweep.h"
 #include "nephele/render/light/detail/scattering_lattice.h"
+#include "nephele/render/light/exp_of_minus.h"
 
 namespace nephele {
 
@@ -74,7 +74,7 @@ detail::ScatteringLattice finestLattice(const RenderVolume& volume, const Placem
             if (!source.column) continue;
             const Vec3f voxel = Vec3f(occupied[i] * BrickGrid::kBrick + Vec3i{x, y, z}) +
                                 Vec3f{1, 1, 1} * (0.5f * float(stride - 1));
-            const Vec3f world = grid.indexToWorld(voxel);
+            const Vec3f world = grid.indexToWorld()(voxel);
             const float depth = std::max(extinction * source.shadow * source.column(world), 0.0f);
             lattice.beam[to] +=
                 rho * source.irradiance(world) * detail::expOfMinus(std::min(depth, 80.0f)) / (4 * kPi);
@@ -150,9 +150,9 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   const int factor = levels[0].factor;
   const float scale = 1.0f / float(factor);
   const Vec3f middle = Vec3f(place.first * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * float(factor - 1));
-  worldToLattice_ = {Mat3f::scaling(scale) * grid.worldToIndex.linear,
-                     (grid.worldToIndex.translation - middle) * scale};
-  const float deepest = grid.voxelSize * float(factor) * detail::typicalDensity(levels[0]);
+  worldToLattice_ = {Mat3f::scaling(scale) * grid.worldToIndex().linear,
+                     (grid.worldToIndex().translation - middle) * scale};
+  const float deepest = grid.voxelSize() * float(factor) * detail::typicalDensity(levels[0]);
   if (deepest * even.extinction > kDeepestCell) even.extinction = kDeepestCell / deepest;
   // Without scattering one sweep tells all.
   if (even.albedo > 0)
@@ -162,7 +162,7 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
     const detail::ScatteringLattice& lattice = levels[level];
     std::vector<Vec3f> directions;
     for (const Vec3f& way : ways)
-      directions.push_back(grid.worldToIndex.linear * way * (1.0f / float(lattice.factor)));
+      directions.push_back(grid.worldToIndex().linear * way * (1.0f / float(lattice.factor)));
     detail::LightSweep sweeper(lattice, even.extinction, inflow, directions);
     detail::Anderson anderson(lattice.density);
     std::vector<float> light = level + 1 == levels.size()

@@ -55,7 +55,7 @@ void PixelMotion::evaluate(const Vec3d& inVolume, float (&motion)[2], bool isSti
 
 DensityNormals::DensityNormals(const RenderVolume& volume)
     : density_(gridField(std::shared_ptr<const BrickGrid>(std::shared_ptr<void>(), &volume.density()))),
-      voxelSize_(volume.density().voxelSize) {}
+      voxelSize_(volume.density().voxelSize()) {}
 
 void DensityNormals::gradients(std::span<const Vec3f> points, float step, std::span<Vec3f> results) const {
   std::vector<float> x[3], low(points.size()), high(points.size());

@@ -113,10 +113,10 @@ CodedBricks::CodedBricks(const BrickGrid& grid) : floatCount_(grid.poolSize() * 
   const std::shared_ptr<float[]> pairs = std::make_shared_for_overwrite<float[]>(floatCount_);
   detail::useHugePages(pairs.get(), pairs.get() + floatCount_);
   const std::vector<float> units =
-      code(grid.values.data() + sampleOffset(0, 0, 0), {BrickGrid::kVolume, row, row * row}, pairs.get(),
+      code(grid.values().data() + sampleOffset(0, 0, 0), {BrickGrid::kVolume, row, row * row}, pairs.get(),
            kPairs, grid.poolSize());
   pairs_ = {pairs, pairs.get()};
-  enter(grid.table, units, kPairs);
+  enter(grid.table(), units, kPairs);
 }
 
 CodedBricks::CodedBricks(std::vector<float> nodes, std::span<const std::int32_t> table)
@@ -145,7 +145,7 @@ float CodedBricks::at(std::size_t place, const Vec3i& node) const {
 }
 
 std::size_t CodedBricks::estimateBytes(const BrickGrid& grid) {
-  return grid.poolSize() * kPairs * sizeof(float) + grid.table.size() * sizeof(Entry);
+  return grid.poolSize() * kPairs * sizeof(float) + grid.table().size() * sizeof(Entry);
 }
 
 }  // namespace nephele

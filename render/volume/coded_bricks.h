@@ -10,7 +10,7 @@
 
 namespace nephele {
 
-struct BrickGrid;
+class BrickGrid;
 
 /// Bricks of 9^3 nodes in 16 bits each, as the march reads them: half the bytes of a float, and the eight
 /// corners of a cell in two loads of 64 bits.

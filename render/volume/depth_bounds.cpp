@@ -18,18 +18,18 @@ constexpr float kMargin = 0.5f;
 // Cubes of `size`^3 bricks that hold an occupied one, by their lower corner in bricks.
 std::vector<Vec3i> cubesOf(const RenderVolume& volume, int size) {
   const BrickGrid& grid = volume.density();
-  const Vec3i n{(grid.brickCount.x + size - 1) / size, (grid.brickCount.y + size - 1) / size,
-                (grid.brickCount.z + size - 1) / size};
+  const Vec3i n{(grid.brickCount().x + size - 1) / size, (grid.brickCount().y + size - 1) / size,
+                (grid.brickCount().z + size - 1) / size};
   std::vector<bool> seen(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
   std::vector<Vec3i> cubes;
   for (const Vec3i& brick : volume.occupiedBricks()) {
-    const Vec3i at = brick - grid.firstBrick, cube{at.x / size, at.y / size, at.z / size};
+    const Vec3i at = brick - grid.firstBrick(), cube{at.x / size, at.y / size, at.z / size};
     const std::size_t entry =
         (std::size_t(cube.z) * std::size_t(n.y) + std::size_t(cube.y)) * std::size_t(n.x) +
         std::size_t(cube.x);
     if (seen[entry]) continue;
     seen[entry] = true;
-    cubes.push_back(grid.firstBrick + cube * size);
+    cubes.push_back(grid.firstBrick() + cube * size);
   }
   return cubes;
 }
@@ -51,7 +51,7 @@ DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
     const Vec3f first = Vec3f(cube * BrickGrid::kBrick) - Vec3f{kMargin, kMargin, kMargin};
     const float side = float(size * BrickGrid::kBrick) + 2 * kMargin;
     for (int corner = 0; corner != 8; ++corner) {
-      const Vec3d seen = camera.project(Vec3d(grid.indexToWorld(
+      const Vec3d seen = camera.project(Vec3d(grid.indexToWorld()(
           first + Vec3f{corner & 1 ? side : 0, corner & 2 ? side : 0, corner & 4 ? side : 0})));
       for (int axis = 0; axis != 3; ++axis) {
         low[axis] = std::min(low[axis], seen[axis]);

@@ -52,15 +52,14 @@ void fill(const float* coarse, const Vec3i& part, int factor, float* out) {
 std::shared_ptr<const BrickGrid> finerDensity(const BrickGrid& grid, int factor) {
   require(factor == 1 || factor == 2 || factor == 4 || factor == 8,
           "finer density: expected a factor of 1, 2, 4 or 8");
-  auto fine = std::make_shared<BrickGrid>();
   const float scale = float(factor);
-  fine->indexToWorld = {grid.indexToWorld.linear * Mat3f::scaling(1 / scale), grid.indexToWorld.translation};
-  fine->worldToIndex = {Mat3f::scaling(scale) * grid.worldToIndex.linear,
-                        grid.worldToIndex.translation * scale};
-  fine->voxelSize = grid.voxelSize / scale;
-  fine->firstBrick = grid.firstBrick * factor;
-  fine->brickCount = grid.brickCount * factor;
-  fine->table.assign(grid.table.size() * std::size_t(factor) * std::size_t(factor) * std::size_t(factor), 0);
+  const Lattice lattice{
+      {grid.indexToWorld().linear * Mat3f::scaling(1 / scale), grid.indexToWorld().translation},
+      {Mat3f::scaling(scale) * grid.worldToIndex().linear, grid.worldToIndex().translation * scale},
+      grid.voxelSize() / scale};
+  auto fine = std::make_shared<BrickGrid>(
+      lattice, BrickBox{grid.firstBrick() * factor, grid.brickCount() * factor}, 0.0f);
+  std::vector<std::int32_t> table(fine->table().size(), 0);
 
   struct Source {
     std::int32_t pool;
@@ -68,32 +67,30 @@ std::shared_ptr<const BrickGrid> finerDensity(const BrickGrid& grid, int factor)
   };
   // A coarse brick that stands at several places is a constant, and so are all its parts.
   std::vector<std::int32_t> uses(grid.poolSize(), 0), made(grid.poolSize(), 0);
-  for (const std::int32_t pool : grid.table) ++uses[std::size_t(pool)];
+  for (const std::int32_t pool : grid.table()) ++uses[std::size_t(pool)];
   std::vector<Source> sources{{0, {0, 0, 0}}};
   std::size_t entry = 0;
   Vec3i b;
-  for (b.z = 0; b.z != fine->brickCount.z; ++b.z)
-    for (b.y = 0; b.y != fine->brickCount.y; ++b.y)
-      for (b.x = 0; b.x != fine->brickCount.x; ++b.x, ++entry) {
+  for (b.z = 0; b.z != fine->brickCount().z; ++b.z)
+    for (b.y = 0; b.y != fine->brickCount().y; ++b.y)
+      for (b.x = 0; b.x != fine->brickCount().x; ++b.x, ++entry) {
         const Vec3i coarse{b.x / factor, b.y / factor, b.z / factor};
-        const std::int32_t pool = grid.table[grid.tableIndex(grid.firstBrick + coarse)];
-        if (!(grid.ranges[std::size_t(pool)].max > 0)) continue;
+        const std::int32_t pool = grid.table()[grid.tableIndex(grid.firstBrick() + coarse)];
+        if (!(grid.ranges()[std::size_t(pool)].max > 0)) continue;
         std::int32_t& shared = made[std::size_t(pool)];
         if (uses[std::size_t(pool)] == 1 || shared == 0) {
           shared = std::int32_t(sources.size());
           sources.push_back({pool, b - coarse * factor});
         }
-        fine->table[entry] = shared;
+        table[entry] = shared;
       }
-  resizeLarge(fine->values, sources.size() * BrickGrid::kVolume);
-  fine->ranges.resize(sources.size());
-  std::fill_n(fine->values.begin(), BrickGrid::kVolume, 0.0f);
-  fine->ranges[0] = Interval::of(0.0f);
+  fine->append(sources.size() - 1);
+  fine->setTable(std::move(table));
   parallelFor(sources.size() - 1, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin + 1; i != end + 1; ++i) {
       float* out = fine->brick(std::int32_t(i));
       fill(grid.brick(sources[i].pool), sources[i].part, factor, out);
-      fine->ranges[i] = rangeOfBrick(out);
+      fine->setRange(std::int32_t(i), rangeOfBrick(out));
     }
   });
   return fine;

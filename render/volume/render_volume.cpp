@@ -30,21 +30,20 @@ constexpr std::uint8_t kFarthest = 32;
 RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour)
     : density_(std::move(density)), colour_(std::move(colour)) {
   require(density_ != nullptr, "render volume: no density given");
-  require(!density_->isPacked(), "render volume: the density must not be packed");
   const BrickGrid& grid = *density_;
-  require(grid.background == 0.0f,
+  require(grid.background() == 0.0f,
           fmt::format("density: expected 0 outside of the volume, but its background is {}{}",
-                      grid.background, grid.background > 0 ? "; is it a level set?" : ""));
-  require(grid.values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+                      grid.background(), grid.background() > 0 ? "; is it a level set?" : ""));
+  require(grid.values().size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
           fmt::format(
               "density: {} distinct bricks are more than the {} that can be marched; use a larger voxel size",
               grid.poolSize(), std::numeric_limits<std::int32_t>::max() / BrickGrid::kVolume));
-  for (const Interval& range : grid.ranges)
+  for (const Interval& range : grid.ranges())
     require(std::isfinite(range.min) && std::isfinite(range.max),
             "density: contains values that are not finite");
   // Extinctions and optical depths are floats, too.
   constexpr float most = 1e18f;
-  for (const Interval& range : grid.ranges)
+  for (const Interval& range : grid.ranges())
     require(range.max <= most && range.min >= -most,
             fmt::format("density: expected values up to {:g}, got {:g}", most,
                         range.max > most ? range.max : range.min));
@@ -60,10 +59,10 @@ RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColou
       max(max(worldBounds().max, -worldBounds().max), max(worldBounds().min, -worldBounds().min));
   const float farthest = std::max({reach.x, reach.y, reach.z});
   require(
-      farthest < 2e6f * grid.voxelSize,
+      farthest < 2e6f * grid.voxelSize(),
       fmt::format("density: stands {:g} from the origin, where voxels of {:g} can no longer be told apart; "
                   "move it nearer",
-                  farthest, grid.voxelSize));
+                  farthest, grid.voxelSize()));
 }
 
 RenderVolume RenderVolume::ofField(std::shared_ptr<const BrickGrid> density,
@@ -72,24 +71,24 @@ RenderVolume RenderVolume::ofField(std::shared_ptr<const BrickGrid> density,
   RenderVolume volume(std::move(density));
   require(!volume.isEmpty() || field->isEmpty(),
           fmt::format("render volume: nothing of the field is found with voxels of {}; use smaller ones",
-                      volume.density().voxelSize));
+                      volume.density().voxelSize()));
   volume.field_ = std::move(field);
   return volume;
 }
 
 void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* name) const {
   const auto laidOutAs = [](const BrickGrid& a, const BrickGrid& b) {
-    return a.firstBrick == b.firstBrick && a.brickCount == b.brickCount &&
-           a.worldToIndex.translation == b.worldToIndex.translation &&
-           a.worldToIndex.linear == b.worldToIndex.linear;
+    return a.firstBrick() == b.firstBrick() && a.brickCount() == b.brickCount() &&
+           a.worldToIndex().translation == b.worldToIndex().translation &&
+           a.worldToIndex().linear == b.worldToIndex().linear;
   };
   for (const auto& grid : grids) {
     require((grid == nullptr) == (grids[0] == nullptr), fmt::format("{}: three grids or none needed", name));
     if (!grid) continue;
-    require(!grid->isPacked() && grid->table == grids[0]->table && laidOutAs(*grid, *density_) &&
-                grid->values.size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
+    require(grid->table() == grids[0]->table() && laidOutAs(*grid, *density_) &&
+                grid->values().size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
             fmt::format("{}: its bricks must be laid out as the density's", name));
-    for (const Interval& range : grid->ranges)
+    for (const Interval& range : grid->ranges())
       require(std::isfinite(range.min) && std::isfinite(range.max),
               fmt::format("{}: contains values that are not finite", name));
   }
@@ -117,45 +116,45 @@ void RenderVolume::measureColour() {
 }
 
 bool RenderVolume::isOccupied(std::size_t entry) const {
-  if (density_->ranges[std::size_t(density_->table[entry])].max > 0) return true;
+  if (density_->ranges()[std::size_t(density_->table()[entry])].max > 0) return true;
   for (const auto& grid : colour_.emission)
-    if (grid && grid->ranges[std::size_t(grid->table[entry])].max > 0) return true;
+    if (grid && grid->ranges()[std::size_t(grid->table()[entry])].max > 0) return true;
   return false;
 }
 
 void RenderVolume::findOccupied() {
   const BrickGrid& grid = *density_;
   std::size_t entry = 0;
-  for (int z = 0; z < grid.brickCount.z; ++z)
-    for (int y = 0; y < grid.brickCount.y; ++y)
-      for (int x = 0; x < grid.brickCount.x; ++x, ++entry) {
-        const float most = grid.ranges[std::size_t(grid.table[entry])].max;
+  for (int z = 0; z < grid.brickCount().z; ++z)
+    for (int y = 0; y < grid.brickCount().y; ++y)
+      for (int x = 0; x < grid.brickCount().x; ++x, ++entry) {
+        const float most = grid.ranges()[std::size_t(grid.table()[entry])].max;
         if (!isOccupied(entry)) continue;
-        occupied_.push_back(grid.firstBrick + Vec3i{x, y, z});
+        occupied_.push_back(grid.firstBrick() + Vec3i{x, y, z});
         maxDensity_ = std::max(maxDensity_, most);
       }
 }
 
 void RenderVolume::measureEmptiness() {
-  emptiness_.assign(density_->table.size(), kFarthest);
+  emptiness_.assign(density_->table().size(), kFarthest);
   for (const Vec3i& brick : occupied_) emptiness_[density_->tableIndex(brick)] = 0;
-  detail::spreadDistances(emptiness_, density_->brickCount);
+  detail::spreadDistances(emptiness_, density_->brickCount());
 }
 
 void RenderVolume::measureUniformity() {
   const BrickGrid& grid = *density_;
   std::vector<std::size_t> places(grid.poolSize());
-  for (const std::int32_t pool : grid.table) ++places[std::size_t(pool)];
+  for (const std::int32_t pool : grid.table()) ++places[std::size_t(pool)];
   std::size_t constant = 0;
   for (std::size_t pool = 0; pool != places.size(); ++pool)
-    if (grid.ranges[pool].isPoint() && grid.ranges[pool].max > 0 &&
+    if (grid.ranges()[pool].isPoint() && grid.ranges()[pool].max > 0 &&
         (constant == 0 || places[pool] > places[constant]))
       constant = pool;
-  uniformity_.assign(grid.table.size(), 0);
+  uniformity_.assign(grid.table().size(), 0);
   if (constant == 0) return;
-  for (std::size_t entry = 0; entry != grid.table.size(); ++entry)
-    if (std::size_t(grid.table[entry]) == constant) uniformity_[entry] = kFarthest;
-  detail::spreadDistances(uniformity_, grid.brickCount);
+  for (std::size_t entry = 0; entry != grid.table().size(); ++entry)
+    if (std::size_t(grid.table()[entry]) == constant) uniformity_[entry] = kFarthest;
+  detail::spreadDistances(uniformity_, grid.brickCount());
 }
 
 void RenderVolume::measureBounds() {
@@ -166,7 +165,7 @@ void RenderVolume::measureBounds() {
   indexBounds_ = {Vec3f(low * brickSize), Vec3f((high + Vec3i{1, 1, 1}) * brickSize)};
 
   const auto isFull = [&](const Vec3i& brick) {
-    return grid.ranges[std::size_t(grid.poolIndex(brick))].min > 0;
+    return grid.ranges()[std::size_t(grid.poolIndex(brick))].min > 0;
   };
   std::vector<Vec3i> border;
   for (const Vec3i& brick : occupied_) {
@@ -205,14 +204,14 @@ void RenderVolume::measureBounds() {
     for (int corner = 0; corner != 8; ++corner) {
       const Vec3f p{corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
                     corner & 4 ? box.max.z : box.min.z};
-      outline_.push_back(grid.indexToWorld(p));
+      outline_.push_back(grid.indexToWorld()(p));
       worldBounds_ = worldBounds_.including(outline_.back());
     }
   }
 }
 
 float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
-  const Vec3f p = density_->worldToIndex(world);
+  const Vec3f p = density_->worldToIndex()(world);
   const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
   const Vec3f f = p - Vec3f(cell);
   const auto valueOf = [&](const BrickGrid& grid) {

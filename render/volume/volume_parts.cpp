@@ -50,11 +50,10 @@ struct PartSources {
 };
 
 void checkGrid(const BrickGrid& grid, const char* name, bool needsZero) {
-  require(!grid.isPacked(), fmt::format("{}: must not be packed", name));
   require(
-      !needsZero || grid.background == 0.0f,
-      fmt::format("{}: expected 0 outside of the volume, but its background is {}", name, grid.background));
-  for (const Interval& range : grid.ranges)
+      !needsZero || grid.background() == 0.0f,
+      fmt::format("{}: expected 0 outside of the volume, but its background is {}", name, grid.background()));
+  for (const Interval& range : grid.ranges())
     require(std::isfinite(range.min) && std::isfinite(range.max),
             fmt::format("{}: contains values that are not finite", name));
 }
@@ -68,7 +67,7 @@ void checkThree(const VolumePart::Grids& grids, const char* name, bool needsZero
 
 float largest(const BrickGrid& grid) {
   float most = 0;
-  for (const Interval& range : grid.ranges) most = std::max(most, range.max);
+  for (const Interval& range : grid.ranges()) most = std::max(most, range.max);
   return most;
 }
 
@@ -76,10 +75,10 @@ float largest(const BrickGrid& grid) {
 const BrickGrid& finest(const std::vector<VolumePart>& parts) {
   const BrickGrid* best = nullptr;
   const auto key = [](const BrickGrid& grid) {
-    const Mat3f& m = grid.indexToWorld.linear;
-    const Vec3f& t = grid.indexToWorld.translation;
-    return std::tuple(grid.voxelSize, m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1),
-                      m(2, 2), t.x, t.y, t.z);
+    const Mat3f& m = grid.indexToWorld().linear;
+    const Vec3f& t = grid.indexToWorld().translation;
+    return std::tuple(grid.voxelSize(), m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0),
+                      m(2, 1), m(2, 2), t.x, t.y, t.z);
   };
   const auto consider = [&](const std::shared_ptr<const BrickGrid>& grid) {
     if (grid && (!best || key(*grid) < key(*best))) best = grid.get();
@@ -160,12 +159,12 @@ class Combiner {
 Vec3d Combiner::farthest(const VolumePart& part) const {
   Vec3d fastest{}, result{};
   for (std::size_t c = 0; c != 3 && part.velocity[0]; ++c)
-    for (const Interval& range : part.velocity[c]->ranges)
+    for (const Interval& range : part.velocity[c]->ranges())
       fastest[int(c)] = std::max(fastest[int(c)], double(range.magnitude()));
   const double time = std::max(std::fabs(part.shutter.open), std::fabs(part.shutter.close));
   for (int row = 0; row != 3; ++row)
     for (int c = 0; c != 3; ++c)
-      result[row] += std::fabs(double(lattice_.worldToIndex.linear(row, c))) * fastest[c] * time;
+      result[row] += std::fabs(double(lattice_.worldToIndex().linear(row, c))) * fastest[c] * time;
   return result;
 }
 
@@ -206,7 +205,7 @@ void Combiner::addMoving(const PartSources& sources, const BlackBodyColours& inc
   for (int c = 0; c != 3; ++c) world[c] = double(sources.velocity[std::size_t(c)].at(voxel));
   Vec3d velocity{};
   for (int row = 0; row != 3; ++row)
-    for (int c = 0; c != 3; ++c) velocity[row] += double(lattice_.worldToIndex.linear(row, c)) * world[c];
+    for (int c = 0; c != 3; ++c) velocity[row] += double(lattice_.worldToIndex().linear(row, c)) * world[c];
   const double open = shutter.close - shutter.open, way = length(velocity) * open;
   const int count = int(std::clamp(std::ceil(way), 1.0, double(kMostTimes)));
   float sum[kChannels] = {};
@@ -271,14 +270,7 @@ RenderVolume Combiner::combined(const Progress& progress) {
   std::array<std::shared_ptr<BrickGrid>, kChannels> grids;
   for (int c = 0; c != kChannels; ++c) {
     if (!channels_[c]) continue;
-    grids[c] = std::make_shared<BrickGrid>();
-    grids[c]->indexToWorld = lattice_.indexToWorld;
-    grids[c]->worldToIndex = lattice_.worldToIndex;
-    grids[c]->voxelSize = lattice_.voxelSize;
-    grids[c]->firstBrick = box_.first;
-    grids[c]->brickCount = box_.count;
-    grids[c]->values.assign(BrickGrid::kVolume, 0.0f);
-    grids[c]->ranges.assign(1, Interval::of(0));
+    grids[c] = std::make_shared<BrickGrid>(lattice_.lattice(), box_, 0.0f);
   }
   std::vector<std::int32_t> table(box_.size(), 0);
   std::map<std::array<float, kChannels>, std::int32_t> constants{{{}, 0}};
@@ -309,7 +301,7 @@ RenderVolume Combiner::combined(const Progress& progress) {
         constant[c] = ranges[c][i].min;
       }
       std::int32_t& entry = table[box_.numberOf(bricks[begin + i])];
-      entry = std::int32_t(grids[0]->ranges.size());
+      entry = std::int32_t(grids[0]->poolSize());
       if (isConstant) {
         const auto [known, isNew] = constants.try_emplace(constant, entry);
         entry = known->second;
@@ -318,15 +310,16 @@ RenderVolume Combiner::combined(const Progress& progress) {
       for (int c = 0; c != kChannels; ++c) {
         if (!grids[c]) continue;
         const float* from = samples[c].data() + i * volume;
-        grids[c]->values.insert(grids[c]->values.end(), from, from + volume);
-        grids[c]->ranges.push_back(ranges[c][i]);
+        const std::int32_t pool = grids[c]->append(1);
+        std::copy_n(from, volume, grids[c]->brick(pool));
+        grids[c]->setRange(pool, ranges[c][i]);
       }
     }
     progress.advance(double(begin + count) / double(bricks.size()));
   }
   VolumeColour colour;
   for (int c = 0; c != kChannels; ++c)
-    if (grids[c]) grids[c]->table = table;
+    if (grids[c]) grids[c]->setTable(table);
   for (std::size_t c = 0; c != 3; ++c) {
     colour.scattering[c] = grids[1 + c];
     colour.emission[c] = grids[4 + c];

@@ -38,7 +38,7 @@ class AdvectVerb : public testing::Test {
 
 double mass(const BrickGrid& grid) {
   double sum = 0;
-  for (const std::int32_t pool : grid.table)
+  for (const std::int32_t pool : grid.table())
     for (int z = 0; z < 8; ++z)
       for (int y = 0; y < 8; ++y)
         for (int x = 0; x < 8; ++x) sum += grid.brick(pool)[sampleOffset(x, y, z)];
@@ -84,17 +84,18 @@ TEST_F(AdvectVerb, ContinuesFrameByFrameToTheSameResult) {
   const ProgramResult second = advect(
       "f2.vdb", velocity + " --steps 2 --continue-from " + file("m1.vdb") + " --map " + file("m2.vdb"));
   ASSERT_EQ(second.exitCode, 0) << second.errors;
-  EXPECT_EQ(density("f2.vdb")->values, density("once.vdb")->values);
+  EXPECT_EQ(density("f2.vdb")->values(), density("once.vdb")->values());
   const FlowMap once = readFlowMap(file("map.vdb")), frames = readFlowMap(file("m2.vdb"));
   EXPECT_EQ(once.bricks, frames.bricks);
-  for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(once.displacement[c]->values, frames.displacement[c]->values);
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_EQ(once.displacement[c]->values(), frames.displacement[c]->values());
 }
 
 TEST_F(AdvectVerb, IsTheSameAtAnyThreadCount) {
   const std::string options = "--velocity curl:amplitude=2%,frequency=2x --steps 2 --threads ";
   ASSERT_EQ(advect("one.vdb", options + "1").exitCode, 0);
   ASSERT_EQ(advect("four.vdb", options + "4").exitCode, 0);
-  EXPECT_EQ(density("one.vdb")->values, density("four.vdb")->values);
+  EXPECT_EQ(density("one.vdb")->values(), density("four.vdb")->values());
 }
 
 TEST_F(AdvectVerb, CarriesEveryGridOfASimulationByItsOwnVelocity) {
@@ -122,11 +123,11 @@ TEST_F(AdvectVerb, SaysWhichGridsAreLeftOut) {
 TEST_F(AdvectVerb, HasAOneLineFormInCloud) {
   const std::string grow = "cloud " + ownData("data/sphere_uv.obj") + " --resolution 32 --layers 1 -o ";
   ASSERT_EQ(runProgram(grow + file("none.vdb") + " --advect 0").exitCode, 0);
-  EXPECT_EQ(density("none.vdb")->values, density("cloud.vdb")->values);
+  EXPECT_EQ(density("none.vdb")->values(), density("cloud.vdb")->values());
   const ProgramResult result = runProgram(grow + file("ragged.vdb") + " --advect 5%");
   ASSERT_EQ(result.exitCode, 0) << result.errors;
   const auto whole = density("cloud.vdb"), ragged = density("ragged.vdb");
-  EXPECT_NE(ragged->values, whole->values);
+  EXPECT_NE(ragged->values(), whole->values());
   EXPECT_NEAR(mass(*ragged) / mass(*whole), 1, 0.25);
   // Something lies where nothing was.
   const ScalarField before = gridField(whole);
@@ -134,7 +135,7 @@ TEST_F(AdvectVerb, HasAOneLineFormInCloud) {
   for (int z = -20; z <= 20; ++z)
     for (int y = -20; y <= 20; ++y)
       for (int x = -20; x <= 20; ++x)
-        arrived += ragged->at({x, y, z}) > 0.5f && before(ragged->indexToWorld(Vec3f(Vec3i{x, y, z}))) == 0;
+        arrived += ragged->at({x, y, z}) > 0.5f && before(ragged->indexToWorld()(Vec3f(Vec3i{x, y, z}))) == 0;
   EXPECT_GT(arrived, 20);
 }
 

@@ -78,7 +78,7 @@ TEST_F(CloudFields, RampsRunOverTheBoxOfTheShape) {
   const auto up = density("height:0=0,1=1");
   EXPECT_NEAR(up->at({0, 0, 0}), 0.5, 1e-5);
   EXPECT_NEAR(up->at({0, -10, 0}), 0.25, 1e-5);
-  EXPECT_EQ(up->values, density("along:0,1,0:0=0,1=1")->values);
+  EXPECT_EQ(up->values(), density("along:0,1,0:0=0,1=1")->values());
   const auto aslant = density("along:-3,0,0:0=0,0.5=0,0.5=2,1=4");
   // Towards -x: place 0.25 at x = 0.5, and 0.75 at x = -0.5.
   EXPECT_EQ(aslant->at({10, 0, 0}), 0);
@@ -107,7 +107,7 @@ TEST_F(CloudFields, MasksAreReadInTheWorld) {
   EXPECT_NEAR(masked->at({15, 0, 3}), 2.5, 1e-4);
   // Below 0 it counts as 0.
   EXPECT_EQ(masked->at({-5, 0, 0}), 1);
-  EXPECT_EQ(masked->values, density("mask:" + path + ":1,3")->values);
+  EXPECT_EQ(masked->values(), density("mask:" + path + ":1,3")->values());
 }
 
 TEST_F(CloudFields, TheInsideOfALevelSetIsOne) {
@@ -145,8 +145,8 @@ TEST_F(CloudFields, OfOneValueAreThatConstant) {
             "--amplitude height:0=2%,1=2% --frequency along:1,0,0:0=5x,1=5x --lacunarity height:0=2,1=2 "
             "--roughness height:0=0.5,1=0.5 --billow facing:0,1,0:-1=0.7,1=0.7 --billow-scale "
             "height:0=0.9,1=0.9 --advect height:0=1%,1=1% --density height:0=2,1=2");
-  EXPECT_EQ(constants->values, fields->values);
-  EXPECT_EQ(constants->table, fields->table);
+  EXPECT_EQ(constants->values(), fields->values());
+  EXPECT_EQ(constants->table(), fields->table());
 }
 
 TEST_F(CloudFields, AmplitudeLeavesThePlainPartsPlain) {
@@ -202,12 +202,12 @@ TEST_F(CloudFields, NoisesAndTheirTimeAreChosen) {
   const std::string common = "--resolution 32 --layers 1 --edge-thickness 5% --amplitude 4% ";
   const auto perlin = grown(common);
   for (const std::string kind : {"simplex", "worley", "worley_difference", "value", "gabor", "fft"}) {
-    EXPECT_NE(grown(common + "--noise " + kind)->values, perlin->values) << kind;
+    EXPECT_NE(grown(common + "--noise " + kind)->values(), perlin->values()) << kind;
     EXPECT_EQ(stats()["layers"][0]["noise"], kind);
   }
-  EXPECT_EQ(grown(common + "--noise perlin")->values, perlin->values);
+  EXPECT_EQ(grown(common + "--noise perlin")->values(), perlin->values());
   const auto later = grown(common + "--noise-time 0.5 --noise-period 4");
-  EXPECT_NE(later->values, perlin->values);
+  EXPECT_NE(later->values(), perlin->values());
   const auto round = grown(common + "--noise-time 4.5 --noise-period 4");
   for (int i = -20; i <= 20; ++i)
     for (int j = -20; j <= 20; ++j) EXPECT_NEAR(round->at({i, j, 3}), later->at({i, j, 3}), 0.01);

@@ -54,7 +54,7 @@ class CloudRecipe : public testing::Test {
 TEST_F(CloudRecipe, OfLayersWithoutKeysIsTheFractalForm) {
   const std::string common = "--resolution 40 --amplitude 3% --noise value --seed 5 ";
   const auto fractal = grown("", common + "--layers 2"), recipe = grown("[[layer]]\n[[layer]]\n", common);
-  EXPECT_EQ(fractal->values, recipe->values);
+  EXPECT_EQ(fractal->values(), recipe->values());
   // What the fractal form gives a layer, said again by the recipe.
   const auto same = grown(
       "[[layer]]\nfrequency = \"4.4x\"\nnoise = \"value\"\n[[layer]]\namplitude = \"1.65%\"\nbillow = 1\n",
@@ -141,7 +141,7 @@ TEST_F(CloudRecipe, MasksALayer) {
   EXPECT_NEAR(mass(*masked, -1), mass(*bare, -1), rounding);
   EXPECT_NEAR(mass(*masked, 1), mass(*even, 1), 0.01 * mass(*even, 1));
   const auto named = grown(layer + "mask = \"" + folder.file("upper half.vdb") + ":growth\"\n", common);
-  EXPECT_EQ(named->values, masked->values);
+  EXPECT_EQ(named->values(), masked->values());
 }
 
 TEST_F(CloudRecipe, LayersAsTypedCutTheRecipeShortOrGoOnFromIt) {

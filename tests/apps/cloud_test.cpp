@@ -52,10 +52,10 @@ TEST(CloudVerb, IsTheSameAtAnyThreadCount) {
     return toBricks(readScalarGrid(path));
   };
   const auto one = grown("--threads 1"), two = grown("--threads 2"), four = grown("--threads 4");
-  EXPECT_EQ(one->values, two->values);
-  EXPECT_EQ(one->values, four->values);
-  EXPECT_EQ(one->table, four->table);
-  EXPECT_NE(one->values, grown("--threads 1 --seed 9")->values);
+  EXPECT_EQ(one->values(), two->values());
+  EXPECT_EQ(one->values(), four->values());
+  EXPECT_EQ(one->table(), four->table());
+  EXPECT_NE(one->values(), grown("--threads 1 --seed 9")->values());
 }
 
 TEST(CloudVerb, GrowsOnALevelSetAsOnItsMesh) {
@@ -100,8 +100,8 @@ TEST(CloudVerb, GrowsCloudsOfEverySpeciesWithoutAnInput) {
 
 TEST(CloudVerb, MakesTheShapeOfItsSeed) {
   const auto first = generated("--species humilis --shape-seed 7 --threads 1");
-  EXPECT_EQ(first->values, generated("--species humilis --shape-seed 7")->values);
-  EXPECT_NE(first->values, generated("--species humilis --shape-seed 8")->values);
+  EXPECT_EQ(first->values(), generated("--species humilis --shape-seed 7")->values());
+  EXPECT_NE(first->values(), generated("--species humilis --shape-seed 8")->values());
 }
 
 TEST(CloudVerb, CutsTheBaseOfGeneratedCloudsUnlessToldNotTo) {

@@ -79,8 +79,8 @@ TEST_F(LevelsetVerb, SameCommandSameGrid) {
     return toBricks(readScalarGrid(volume_));
   };
   const auto one = bricksOf("--resolution 60 --threads 1"), four = bricksOf("--resolution 60 --threads 4");
-  EXPECT_EQ(one->table, four->table);
-  EXPECT_EQ(one->values, four->values);
+  EXPECT_EQ(one->table(), four->table());
+  EXPECT_EQ(one->values(), four->values());
 }
 
 TEST_F(LevelsetVerb, TooCoarseIsRefusedWithAResolutionToTry) {

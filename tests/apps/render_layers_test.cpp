@@ -8,7 +8,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/camera.h"
@@ -163,10 +165,9 @@ TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
   ASSERT_TRUE(ground.find("backdrop.B"));
   // Level sets are objects, too.
   const std::string levelSet = folder.file("ball.vdb");
-  auto shape = test::densityGrid(test::voxels(0.1f), {-14, -14, -14}, {14, 14, 14}, [](const Vec3f& p) {
-    return std::clamp(0.5f - length(p - Vec3f{0, 0, 0.5f}), -0.3f, 0.3f);
-  });
-  shape->background = -0.3f;
+  const auto shape = bakeGrid(
+      sphere({0, 0, 0.5f}, 0.5f),
+      {.voxelSize = 0.1f, .box = {{-1.4f, -1.4f, -1.4f}, {1.4f, 1.4f, 1.4f}}, .band = {-0.3f, 0.3f}});
   writeVdbFile(levelSet, {toVdb(*shape, {"surface", VdbGridInfo::Class::levelSet})}, {});
   EXPECT_NEAR(make("--aov position --samples 1 --extinction 0.001 --object " + levelSet).at("P.Z", 16, 12),
               1.0f, 0.02f);

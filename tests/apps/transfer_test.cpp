@@ -157,7 +157,7 @@ TEST_F(TransferVerb, WritesTheMapAndTheWarpedMesh) {
   const auto components = vectorComponents(grids[0]);
   const auto x = toBricks(components[0]), y = toBricks(components[1]), z = toBricks(components[2]);
   for (const Vec3f& p : {Vec3f{1.4f, 0, 0}, Vec3f{0.2f, 1.2f, 0}, Vec3f{0.2f, 0, -1.2f}}) {
-    const Vec3f q = x->worldToIndex(p);
+    const Vec3f q = x->worldToIndex()(p);
     const Vec3i voxel{int(std::lround(q.x)), int(std::lround(q.y)), int(std::lround(q.z))};
     const Vec3d image{double(x->at(voxel)), double(y->at(voxel)), double(z->at(voxel))};
     // Within a voxel, and the chords of the sphere of radius 1, which lie up to 2 % deep.

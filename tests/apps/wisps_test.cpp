@@ -39,11 +39,11 @@ double mass(const std::string& path) {
   const VdbGrid grid = readScalarGrid(path, "density");
   const auto bricks = toBricks(grid);
   double sum = 0;
-  for (const std::int32_t pool : bricks->table)
+  for (const std::int32_t pool : bricks->table())
     for (int z = 0; z < 8; ++z)
       for (int y = 0; y < 8; ++y)
         for (int x = 0; x < 8; ++x) sum += double(bricks->brick(pool)[sampleOffset(x, y, z)]);
-  return sum * std::pow(double(bricks->voxelSize), 3);
+  return sum * std::pow(double(bricks->voxelSize()), 3);
 }
 
 TEST_F(WispsVerb, MakesWispsWithoutAnInput) {
@@ -82,7 +82,7 @@ TEST_F(WispsVerb, TakesPointsWithWhatTheyCarry) {
   // Near the guides, red and green.
   const auto red = toBricks(vectorComponents(grids[1])[0]), green = toBricks(vectorComponents(grids[1])[1]);
   const auto at = [](const BrickGrid& grid, const Vec3f& p) {
-    const Vec3f q = grid.worldToIndex(p);
+    const Vec3f q = grid.worldToIndex()(p);
     return grid.at({int(std::lround(q.x)), int(std::lround(q.y)), int(std::lround(q.z))});
   };
   EXPECT_GT(at(*red, {0, 0, 0}), 0.99f);
@@ -137,8 +137,8 @@ TEST_F(WispsVerb, IsTheSameAtAnyThreadCount) {
   ASSERT_EQ(wisps("one.vdb", options + "1").exitCode, 0);
   ASSERT_EQ(wisps("four.vdb", options + "4").exitCode, 0);
   const auto one = readVdbFile(file("one.vdb")), four = readVdbFile(file("four.vdb"));
-  EXPECT_EQ(toBricks(one[0])->values, toBricks(four[0])->values);
-  EXPECT_EQ(toBricks(vectorComponents(one[1])[1])->values, toBricks(vectorComponents(four[1])[1])->values);
+  EXPECT_EQ(toBricks(one[0])->values(), toBricks(four[0])->values());
+  EXPECT_EQ(toBricks(vectorComponents(one[1])[1])->values(), toBricks(vectorComponents(four[1])[1])->values());
 }
 
 TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {

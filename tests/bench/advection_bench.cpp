@@ -81,7 +81,7 @@ BENCHMARK(gridlessFrame)->DenseRange(5, 60, 11)->Unit(benchmark::kMillisecond)->
 void selmaFrame(benchmark::State& state) {
   static std::vector<FlowMap> maps;
   const auto grid = cloud();
-  const Matter matter(std::span(&grid, 1), latticeOf(*grid));
+  const Matter matter(std::span(&grid, 1), grid->lattice());
   if (maps.empty()) maps.push_back(identityMap(matter));
   while (int(maps.size()) < state.range(0))
     maps.push_back(advanced(maps.back(), matter, velocityOf(int(maps.size()) - 1), 1));
@@ -113,7 +113,7 @@ void oneStep(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(advectGrids({cloud()}, u, options));
   const auto grid = cloud();
   state.SetItemsProcessed(state.iterations() *
-                          std::int64_t(Matter(std::span(&grid, 1), latticeOf(*grid)).bricks().size() * 512));
+                          std::int64_t(Matter(std::span(&grid, 1), grid->lattice()).bricks().size() * 512));
 }
 BENCHMARK(oneStep)->DenseRange(0, 4)->Unit(benchmark::kMillisecond)->UseRealTime();
 

@@ -93,13 +93,13 @@ void bakedMap(benchmark::State& state) {
   const auto layout =
       bakeGrid(warped.object,
                {.voxelSize = voxel, .box = box.expanded(4 * voxel), .band = Interval{-3 * voxel, 3 * voxel}});
-  const std::size_t bricks = layout->ranges.size() - 2;
+  const std::size_t bricks = layout->ranges().size() - 2;
   // What one brick of 8^3 asks for, on all of them.
   std::vector<Vec3i> places;
-  for (std::size_t i = 0; i < layout->table.size(); ++i)
-    if (layout->table[i] >= 2) {
-      const auto nx = std::size_t(layout->brickCount.x), ny = std::size_t(layout->brickCount.y);
-      places.push_back(layout->firstBrick + Vec3i{int(i % nx), int(i / nx % ny), int(i / nx / ny)});
+  for (std::size_t i = 0; i < layout->table().size(); ++i)
+    if (layout->table()[i] >= 2) {
+      const auto nx = std::size_t(layout->brickCount().x), ny = std::size_t(layout->brickCount().y);
+      places.push_back(layout->firstBrick() + Vec3i{int(i % nx), int(i / nx % ny), int(i / nx / ny)});
     }
   for (auto _ : state) {
     parallelFor(places.size(), 4, [&](std::size_t begin, std::size_t end) {

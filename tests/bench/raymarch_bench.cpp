@@ -48,8 +48,8 @@ struct Rays {
     scene.octaves = octaves;
     scene.attenuation[1] = 0.9f, scene.attenuation[2] = 0.7f;
     scene.extinction = extinction;
-    scene.step = scene.uniformStep = grid->voxelSize;
-    scene.leastStep = grid->voxelSize / 8;
+    scene.step = scene.uniformStep = grid->voxelSize();
+    scene.leastStep = grid->voxelSize() / 8;
     for (int i = 0; i != across * across; ++i) {
       const Vec3f origin{float(i % across - across / 2) / 32, float(i / across - across / 2) / 32, -1.0f},
           direction = normalize(Vec3f{0.1f, 0.05f, 1});
@@ -57,7 +57,7 @@ struct Rays {
         return LatticeRay{map(origin) - Vec3f(first * 8), map.linear * direction};
       };
       MarchRay& ray = rays.emplace_back();
-      ray.density = in(grid->worldToIndex, grid->firstBrick);
+      ray.density = in(grid->worldToIndex(), grid->firstBrick());
       ray.suns[0] = in(sun.light.worldToLattice(), sun.light.firstBrick());
       ray.length = 2;
       for (int n = 0; n != 3; ++n) ray.weight[0][0][n] = 0.1f;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -14,16 +15,12 @@ namespace nephele::test {
 template <class F>
 std::shared_ptr<BrickGrid> denseGrid(const Vec3i& firstBrick, const Vec3i& brickCount, const F& value,
                                      const Affine& indexToWorld = {}, float background = 0.0f) {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->indexToWorld = indexToWorld;
-  grid->worldToIndex = inverse(indexToWorld);
-  grid->voxelSize = std::cbrt(std::abs(determinant(indexToWorld.linear)));
-  grid->background = background;
-  grid->firstBrick = firstBrick;
-  grid->brickCount = brickCount;
+  auto grid =
+      std::make_shared<BrickGrid>(Lattice::of(indexToWorld), BrickBox{firstBrick, brickCount}, background);
   const int count = brickCount.x * brickCount.y * brickCount.z;
-  for (int i = 0; i < count; ++i) grid->table.push_back(i + 1);
-  grid->values.assign(std::size_t(count + 1) * BrickGrid::kVolume, background);
+  std::vector<std::int32_t> table(grid->places().size());
+  std::iota(table.begin(), table.end(), grid->append(table.size()));
+  grid->setTable(std::move(table));
   for (int i = 0; i < count; ++i) {
     const Vec3i b = firstBrick + Vec3i{i % brickCount.x, i / brickCount.x % brickCount.y,
                                        i / (brickCount.x * brickCount.y)};

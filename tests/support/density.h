@@ -3,6 +3,8 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
+#include <vector>
 
 #include "nephele/levelset/grid/brick_grid.h"
 
@@ -13,18 +15,13 @@ namespace nephele::test {
 inline std::shared_ptr<BrickGrid> densityGrid(const Affine& indexToWorld, const Vec3i& first,
                                               const Vec3i& last,
                                               const std::function<float(const Vec3f&)>& density) {
-  auto grid = std::make_shared<BrickGrid>();
-  grid->indexToWorld = indexToWorld;
-  grid->worldToIndex = inverse(indexToWorld);
-  grid->voxelSize = std::cbrt(std::fabs(determinant(indexToWorld.linear)));
   // A brick more on every side, as room for the empty voxels that end the volume.
-  grid->firstBrick = brickOf(first) - Vec3i{1, 1, 1};
-  grid->brickCount = brickOf(last) + Vec3i{2, 2, 2} - grid->firstBrick;
-  const std::size_t count = std::size_t(grid->brickCount.x) * grid->brickCount.y * grid->brickCount.z;
-  grid->table.resize(count);
-  grid->values.assign((count + 1) * BrickGrid::kVolume, 0.0f);
-  grid->ranges.assign(count + 1, Interval::of(0));
-  for (std::size_t entry = 0; entry != count; ++entry) grid->table[entry] = std::int32_t(entry + 1);
+  const Vec3i firstBrick = brickOf(first) - Vec3i{1, 1, 1};
+  auto grid = std::make_shared<BrickGrid>(Lattice::of(indexToWorld),
+                                          BrickBox{firstBrick, brickOf(last) + Vec3i{2, 2, 2} - firstBrick});
+  std::vector<std::int32_t> table(grid->places().size());
+  std::iota(table.begin(), table.end(), grid->append(table.size()));
+  grid->setTable(std::move(table));
   for (int z = first.z; z <= last.z; ++z)
     for (int y = first.y; y <= last.y; ++y)
       for (int x = first.x; x <= last.x; ++x) {

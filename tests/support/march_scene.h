@@ -10,9 +10,9 @@ namespace nephele::test {
 inline MarchScene sceneOf(const RenderVolume& volume) {
   const BrickGrid& grid = volume.density();
   MarchScene scene;
-  scene.density = {grid.values.data(), grid.table.data(), grid.brickCount, volume.coded().pairs(),
+  scene.density = {grid.values().data(), grid.table().data(), grid.brickCount(), volume.coded().pairs(),
                    volume.coded().entries()};
-  scene.ranges = grid.ranges.data();
+  scene.ranges = grid.ranges().data();
   scene.emptiness = volume.emptiness().data();
   scene.uniformity = volume.uniformity().data();
   return scene;

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "nephele/levelset/grid/lattice.h"
+#include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/field/field.h"
 
 namespace nephele::detail {

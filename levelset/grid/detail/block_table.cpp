@@ -151,13 +151,7 @@ std::uint32_t classifyRow(const BlockTable& table, Beside beside, const Vec3i& f
 
 std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice& lattice, Beside beside,
                                         const std::string& name) {
-  auto result = std::make_shared<BrickGrid>();
-  result->indexToWorld = lattice.indexToWorld;
-  result->worldToIndex = lattice.worldToIndex;
-  result->voxelSize = lattice.voxelSize;
-  result->background = blocks.sign * blocks.constants.front();
-  result->firstBrick = blocks.box.first;
-  result->brickCount = blocks.box.count;
+  auto result = std::make_shared<BrickGrid>(lattice, blocks.box, blocks.sign * blocks.constants.front());
 
   // A constant keeps its number in the pool; positions with samples of their own come after the constants.
   const std::vector<float>& constants = blocks.constants;
@@ -166,40 +160,37 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
   const auto firstOfRow = [&](std::size_t row) {
     return blocks.box.first + Vec3i{0, int(row % rowsPerSlice), int(row / rowsPerSlice)};
   };
-  result->table.resize(rowLength * rowCount);
+  std::vector<std::int32_t> table(rowLength * rowCount);
   std::vector<std::uint32_t> rowStart(rowCount + 1, 0);
   parallelFor(rowCount, 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row)
-      rowStart[row + 1] =
-          classifyRow(blocks, beside, firstOfRow(row), result->table.data() + row * rowLength);
+      rowStart[row + 1] = classifyRow(blocks, beside, firstOfRow(row), table.data() + row * rowLength);
   });
   for (std::size_t row = 0; row < rowCount; ++row) rowStart[row + 1] += rowStart[row];
 
   const std::size_t pool = constants.size() + rowStart[rowCount];
   require(double(pool) <= kMostBricks,
           fmt::format("grid {} has more bricks than can be numbered; use a coarser voxel size", name));
-  resizeLarge(result->values, pool * BrickGrid::kVolume);
-  result->ranges.resize(pool);
-  for (std::size_t c = 0; c < constants.size(); ++c) {
-    requireFinite(&constants[c], 1, name);
-    std::fill_n(result->brick(std::int32_t(c)), BrickGrid::kVolume, blocks.sign * constants[c]);
-    result->ranges[c] = Interval::of(blocks.sign * constants[c]);
-  }
+  requireFinite(constants.data(), int(constants.size()), name);
+  result->reserve(pool);
+  for (std::size_t c = 1; c < constants.size(); ++c) result->appendConstant(blocks.sign * constants[c]);
+  result->append(rowStart[rowCount]);
   parallelFor(rowCount, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       if (rowStart[row + 1] == rowStart[row]) continue;
       auto next = std::int32_t(constants.size() + rowStart[row]);
       for (std::size_t x = 0; x < rowLength; ++x) {
-        std::int32_t& entry = result->table[row * rowLength + x];
+        std::int32_t& entry = table[row * rowLength + x];
         if (entry != kSampled) continue;
         entry = next++;
         float* samples = result->brick(entry);
         gather(blocks, firstOfRow(row) + Vec3i{int(x), 0, 0}, samples);
         requireFinite(samples, BrickGrid::kVolume, name);
-        result->ranges[std::size_t(entry)] = rangeOfStored(samples, BrickGrid::kVolume);
+        result->setRange(entry, rangeOfStored(samples, BrickGrid::kVolume));
       }
     }
   });
+  result->setTable(std::move(table));
   return result;
 }
 

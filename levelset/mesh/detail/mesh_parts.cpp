@@ -11,11 +11,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
+#include <ranges>
 
 #include "nephele/levelset/grid/disjoint_sets.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/mesh/winding_number.h"
 
 namespace nephele::detail {
 namespace {
@@ -103,7 +104,8 @@ int containment(const Mesh& mesh, const PartShape& outer, const PartShape& inner
   if (!boxHolds(outer, inner)) return 0;
   const auto face = mesh.face(inner.faces.front());
   const Vec3d point = (mesh.positions[face[0]] + mesh.positions[face[1]] + mesh.positions[face[2]]) / 3.0;
-  return static_cast<int>(std::lround(windingNumber(mesh, outer.faces, point)));
+  const auto triangles = outer.faces | std::views::transform([&](std::uint32_t f) { return mesh.face(f); });
+  return static_cast<int>(std::lround(windingNumber(mesh.positions, triangles, point)));
 }
 
 enum class Across { manifoldEdges, allEdges };
@@ -329,19 +331,6 @@ Mesh withNearBoundaryMerged(const Mesh& triangles, double tolerance) {
     }
   }
   return withMergedPositions(result);
-}
-
-double windingNumber(const Mesh& triangles, std::span<const std::uint32_t> faces, const Vec3d& point) {
-  double total = 0;
-  for (const std::uint32_t f : faces) {
-    const auto face = triangles.face(f);
-    const Vec3d a = triangles.positions[face[0]] - point;
-    const Vec3d b = triangles.positions[face[1]] - point;
-    const Vec3d c = triangles.positions[face[2]] - point;
-    const double la = length(a), lb = length(b), lc = length(c);
-    total += std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-  }
-  return total / (2 * std::numbers::pi);
 }
 
 std::vector<bool> partsToTurn(const Mesh& triangles, const MeshParts& parts) {

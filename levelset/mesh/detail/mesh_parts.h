@@ -45,10 +45,6 @@ Mesh withoutDuplicates(const Mesh& mesh);
 /// Boundary vertices closer than `tolerance` to each other merged into the first of them.
 Mesh withNearBoundaryMerged(const Mesh& triangles, double tolerance);
 
-/// How often the closed surface of `faces` winds around `point`: 1 inside, 0 outside, -1 inside if
-/// inward.
-double windingNumber(const Mesh& triangles, std::span<const std::uint32_t> faces, const Vec3d& point);
-
 /// Which parts of a closed mesh to turn so that it bounds a solid: outermost parts outward, and cavities,
 /// which are inward parts inside others, kept. A part inside another is turned with it.
 std::vector<bool> partsToTurn(const Mesh& triangles, const MeshParts& parts);

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "nephele/modeling/base/parallel.h"
-#include "nephele/render/light/detail/exp_of_minus.h"
+#include "nephele/render/light/exp_of_minus.h"
 
 namespace nephele::detail {
 

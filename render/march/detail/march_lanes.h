@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "nephele/render/light/exp_of_minus.h"
 #include "nephele/render/volume/lattice_ray.h"
 
 /// Vectors of floats as the march uses them: points along rays, sums along the lanes, exp.
@@ -112,17 +113,12 @@ HWY_INLINE Floats movedUp(Floats x, Floats first) {
   return hn::IfThenElse(hn::FirstN(d, 1), first, reordered(x, order));
 }
 
-// 2^f = 1 + kPower[0] f + ... for |f| <= 1/2: best fit, off by 2e-8 of it at most.
-constexpr float kPower[] = {0.693147182f,   0.240226477f,   0.0555033237f,
-                            0.00961843692f, 0.00133988739f, 0.00015353362f};
-
-// exp(-x) for x from 0 to 80, off by 1e-7 (1 + x) of it at most; 1 where x is 0. Half the work of what
-// libraries have for all numbers.
+// detail::expOfMinus for vectors.
 HWY_INLINE Floats expOfMinus(Floats x) {
   const Lanes d;
   const IntLanes i;
-  // The last bits of `whole` are the nearest whole number.
-  const Floats y = hn::Mul(x, hn::Set(d, -1.44269504f)), middle = hn::Set(d, 12582912.0f);
+  constexpr auto& kPower = detail::kPowerOfTwo;
+  const Floats y = hn::Mul(x, hn::Set(d, detail::kPerMinusLog2)), middle = hn::Set(d, detail::kRounding);
   const Floats whole = hn::Add(y, middle), f = hn::Sub(y, hn::Sub(whole, middle)), f2 = hn::Mul(f, f);
   const auto line = [&](float slope, float at0)
                         HWY_ATTR { return hn::MulAdd(f, hn::Set(d, slope), hn::Set(d, at0)); };

@@ -67,33 +67,33 @@ PathTracer::PathTracer(const RenderVolume& volume, const Medium& medium, const L
   colour_ = medium.extinctionColour / largest(medium.extinctionColour);
   perEmission_ = medium.extinction;
   const BrickGrid& grid = volume.density();
-  scene_.density = {grid.values.data(), grid.table.data(), grid.brickCount};
-  scene_.ranges = grid.ranges.data();
+  scene_.density = {grid.values().data(), grid.table().data(), grid.brickCount()};
+  scene_.ranges = grid.ranges().data();
   scene_.emptiness = volume.emptiness().data();
   if (volume.hasColour()) {
     const VolumeColour::Grids& colours = volume.colour().scattering;
-    for (std::size_t c = 0; c != 3; ++c) scene_.colour.values[c] = colours[c]->values.data();
-    scene_.colour.table = colours[0]->table.data();
-    scene_.colour.count = colours[0]->brickCount;
+    for (std::size_t c = 0; c != 3; ++c) scene_.colour.values[c] = colours[c]->values().data();
+    scene_.colour.table = colours[0]->table().data();
+    scene_.colour.count = colours[0]->brickCount();
   }
   if (volume.hasEmission()) {
     const VolumeColour::Grids& glow = volume.colour().emission;
-    for (std::size_t c = 0; c != 3; ++c) scene_.emission.values[c] = glow[c]->values.data();
-    scene_.emission.table = glow[0]->table.data();
-    scene_.emission.count = glow[0]->brickCount;
-    leastBound_ = 1 / (BrickGrid::kBrick * grid.voxelSize);
+    for (std::size_t c = 0; c != 3; ++c) scene_.emission.values[c] = glow[c]->values().data();
+    scene_.emission.table = glow[0]->table().data();
+    scene_.emission.count = glow[0]->brickCount();
+    leastBound_ = 1 / (BrickGrid::kBrick * grid.voxelSize());
   }
   isColoured_ = volume.hasEmission() || colour_ != Vec3f{1, 1, 1};
-  map_ = grid.worldToIndex;
-  leastStep_ = 1e-4f * grid.voxelSize;
-  const Vec3f corner(grid.firstBrick * BrickGrid::kBrick);
+  map_ = grid.worldToIndex();
+  leastStep_ = 1e-4f * grid.voxelSize();
+  const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
   shift_ = Vec3d(map_.translation) - Vec3d(corner);
   bounds_ = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
   for (const DistantLight& sun : lights.suns) {
     const Vec3f towards = normalize(sun.direction);
     suns_.push_back({towards, map_.linear * towards, sun.irradiance, sun.shadow * colour_});
   }
-  latticeToWorld_ = {grid.indexToWorld.linear, grid.indexToWorld(corner)};
+  latticeToWorld_ = {grid.indexToWorld().linear, grid.indexToWorld()(corner)};
   hasSky_ = lights.hasSky();
   skyMap_ = lights.map.get();
   blurred_ = camera.hasLens() || camera.isMoving() || options.volumeMotion;

@@ -300,7 +300,7 @@ bool Picture::prepare(const Ray& ray, const DepthBounds::Range& reach, const Sub
   // what its neighbours hide. Terraces less than a pixel wide need no hiding.
   const Vec3f beside =
       sub.lattice * std::min(1.0f, lit_.voxelSize / (4 * float(camera_.pixelWidth(double(out.start)))));
-  const Vec3d besideEntry = entry + Vec3d(lit_.source->density().indexToWorld.linear * beside);
+  const Vec3d besideEntry = entry + Vec3d(lit_.source->density().indexToWorld().linear * beside);
   out.density.origin += beside;
   if (lit_.toScattered) {
     out.scattered = lit_.toScattered->ray(entry + ray.direction * double(lit_.lookAhead), ray.direction);

@@ -15,14 +15,14 @@ struct IndexMap {
 
   IndexMap(const BrickGrid& target, const BrickGrid& source) {
     for (int row = 0; row != 3; ++row) {
-      t[row] = double(source.worldToIndex.translation[row]);
+      t[row] = double(source.worldToIndex().translation[row]);
       for (int k = 0; k != 3; ++k)
-        t[row] += double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.translation[k]);
+        t[row] += double(source.worldToIndex().linear(row, k)) * double(target.indexToWorld().translation[k]);
       for (int column = 0; column != 3; ++column) {
         m[row][column] = 0;
         for (int k = 0; k != 3; ++k)
           m[row][column] +=
-              double(source.worldToIndex.linear(row, k)) * double(target.indexToWorld.linear(k, column));
+              double(source.worldToIndex().linear(row, k)) * double(target.indexToWorld().linear(k, column));
       }
     }
     snap();
@@ -81,12 +81,12 @@ class SourceGrid {
   /// Between the target's voxels.
   float at(const Vec3d& place) const {
     const Vec3d p = toSource_(place);
-    if (!(std::fabs(p.x) < 1e8 && std::fabs(p.y) < 1e8 && std::fabs(p.z) < 1e8)) return grid_.background;
+    if (!(std::fabs(p.x) < 1e8 && std::fabs(p.y) < 1e8 && std::fabs(p.z) < 1e8)) return grid_.background();
     const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
     const Vec3f f{float(p.x - cell.x), float(p.y - cell.y), float(p.z - cell.z)};
     const Vec3i brick = brickOf(cell);
     const std::int32_t pool = grid_.poolIndex(brick);
-    if (grid_.ranges[std::size_t(pool)].isPoint()) return grid_.ranges[std::size_t(pool)].min;
+    if (grid_.ranges()[std::size_t(pool)].isPoint()) return grid_.ranges()[std::size_t(pool)].min;
     const float* v =
         grid_.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
     return trilinear(v, f, BrickGrid::kWidth, BrickGrid::kWidth * BrickGrid::kWidth);
@@ -99,14 +99,14 @@ class SourceGrid {
     toSource_.mapped(Vec3d(Vec3f(low)) - motion, Vec3d(Vec3f(high)) + motion, a, b);
     Vec3i first, last;
     for (int axis = 0; axis != 3; ++axis) {
-      const double lowest = grid_.firstBrick[axis], highest = lowest + grid_.brickCount[axis] - 1;
+      const double lowest = grid_.firstBrick()[axis], highest = lowest + grid_.brickCount()[axis] - 1;
       first[axis] = int(std::clamp(std::floor((a[axis] - 0.001) / BrickGrid::kBrick), lowest, highest + 1));
       last[axis] = int(std::clamp(std::floor((b[axis] + 0.001) / BrickGrid::kBrick), lowest - 1, highest));
     }
     for (int z = first.z; z <= last.z; ++z)
       for (int y = first.y; y <= last.y; ++y)
         for (int x = first.x; x <= last.x; ++x)
-          if (grid_.ranges[std::size_t(grid_.poolIndex({x, y, z}))].max > 0) return true;
+          if (grid_.ranges()[std::size_t(grid_.poolIndex({x, y, z}))].max > 0) return true;
     return false;
   }
 
@@ -115,11 +115,11 @@ class SourceGrid {
   template <class Visit>
   void visitBricks(const Vec3d& motion, Visit&& visit) const {
     std::size_t entry = 0;
-    for (int z = 0; z != grid_.brickCount.z; ++z)
-      for (int y = 0; y != grid_.brickCount.y; ++y)
-        for (int x = 0; x != grid_.brickCount.x; ++x, ++entry) {
-          if (!(grid_.ranges[std::size_t(grid_.table[entry])].max > 0)) continue;
-          const Vec3f low((grid_.firstBrick + Vec3i{x, y, z}) * BrickGrid::kBrick);
+    for (int z = 0; z != grid_.brickCount().z; ++z)
+      for (int y = 0; y != grid_.brickCount().y; ++y)
+        for (int x = 0; x != grid_.brickCount().x; ++x, ++entry) {
+          if (!(grid_.ranges()[std::size_t(grid_.table()[entry])].max > 0)) continue;
+          const Vec3f low((grid_.firstBrick() + Vec3i{x, y, z}) * BrickGrid::kBrick);
           Vec3d a, b;
           toTarget_.mapped(Vec3d(low),
                            Vec3d(low + Vec3f{BrickGrid::kBrick, BrickGrid::kBrick, BrickGrid::kBrick}), a, b);

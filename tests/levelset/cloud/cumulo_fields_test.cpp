@@ -127,8 +127,8 @@ TEST(CumuloFields, ConstantsAsFieldsGiveTheSameBits) {
       griddedCumulo(torus(), cumuloLayers(fields), {.voxelSize = voxel, .box = kTorusBox});
   const auto x = toBricks(cloudDensity(a, {.voxelSize = voxel, .edgeThickness = 0.05f}));
   const auto y = toBricks(cloudDensity(b, {.voxelSize = voxel, .edgeThickness = field(0.05f)}));
-  EXPECT_EQ(x->table, y->table);
-  EXPECT_EQ(x->values, y->values);
+  EXPECT_EQ(x->table(), y->table());
+  EXPECT_EQ(x->values(), y->values());
 }
 
 TEST(CumuloFields, VaryingLayersAgreeWithTheProceduralForm) {

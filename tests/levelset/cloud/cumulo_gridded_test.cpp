@@ -394,9 +394,9 @@ TEST(CloudDensity, IsOneInsideZeroOutside) {
   const auto cloud = griddedCumulo(torus(), layers, {.voxelSize = voxel, .box = kTorusBox});
   const float edge = 0.04f;
   const auto density = toBricks(cloudDensity(cloud, {.voxelSize = voxel, .edgeThickness = edge}));
-  EXPECT_EQ(density->background, 0);
+  EXPECT_EQ(density->background(), 0);
   Interval values = Interval::of(0);
-  for (const Interval& range : density->ranges) values = values.hull(range);
+  for (const Interval& range : density->ranges()) values = values.hull(range);
   EXPECT_EQ(values, (Interval{0, 1}));
   // Every voxel is the softened mask of the exact sum.
   const ScalarField read = gridField(density);
@@ -416,7 +416,7 @@ TEST(CloudDensity, SurfaceIsALevelSetThatIsPositiveInside) {
   const auto cloud =
       griddedCumulo(torus(), layersOfSlope(0.5f, 2, 2, 1), {.voxelSize = voxel, .box = kTorusBox});
   const auto surface = toBricks(cloudSurface(cloud, voxel));
-  EXPECT_FLOAT_EQ(surface->background, -3 * voxel);
+  EXPECT_FLOAT_EQ(surface->background(), -3 * voxel);
   const ScalarField read = gridField(surface);
   const Points points = voxelsInBand(cloud.surface, {-2.9f * voxel, 2.9f * voxel}, cloud.box, voxel, 3000);
   const std::vector<float> a = valuesAt(read, points), b = valuesAt(cloud.surface, points);

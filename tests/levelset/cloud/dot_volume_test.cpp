@@ -204,7 +204,7 @@ TEST(DotVolume, ColourDoesNotChangeTheDensity) {
   DotVolume with({.voxelSize = 0.1f, .withColor = true}), without({.voxelSize = 0.1f});
   with.add(dots);
   without.add(dots);
-  EXPECT_EQ(toBricks(with.densityGrid())->values, toBricks(without.densityGrid())->values);
+  EXPECT_EQ(toBricks(with.densityGrid())->values(), toBricks(without.densityGrid())->values());
 }
 
 TEST(DotVolume, IsTheSameAtAnyThreadCountAndInAnyParts) {
@@ -217,7 +217,7 @@ TEST(DotVolume, IsTheSameAtAnyThreadCountAndInAnyParts) {
     for (std::size_t i = 0; i < dots.size(); i += part)
       volume.add(DotSpans(dots).part(i, std::min(part, dots.size() - i)));
     const auto blue = vectorComponents(toVdb(volume.colorGrid(), {"Cd"}))[2];
-    return std::pair(toBricks(volume.densityGrid())->values, toBricks(blue)->values);
+    return std::pair(toBricks(volume.densityGrid())->values(), toBricks(blue)->values());
   };
   const auto one = grown(1, dots.size());
   EXPECT_EQ(one, grown(4, dots.size()));

@@ -49,9 +49,9 @@ double meshVolume(const Pieces& cut) {
 }
 
 bool sameGrid(const BrickGrid& a, const BrickGrid& b) {
-  return a.firstBrick == b.firstBrick && a.brickCount == b.brickCount && a.table == b.table &&
-         a.values.size() == b.values.size() &&
-         std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)) == 0;
+  return a.firstBrick() == b.firstBrick() && a.brickCount() == b.brickCount() && a.table() == b.table() &&
+         a.values().size() == b.values().size() &&
+         std::memcmp(a.values().data(), b.values().data(), a.values().size() * sizeof(float)) == 0;
 }
 
 TEST(BrickMask, MovesAndMeasuresItsSamples) {

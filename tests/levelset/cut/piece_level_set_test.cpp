@@ -69,8 +69,9 @@ TEST(PieceLevelSet, OutlivesItsCut) {
   const auto before = kept.toBricks();
   cut = {};
   const auto after = kept.toBricks();
-  EXPECT_EQ(std::memcmp(before->values.data(), after->values.data(), before->values.size() * sizeof(float)),
-            0);
+  EXPECT_EQ(
+      std::memcmp(before->values().data(), after->values().data(), before->values().size() * sizeof(float)),
+      0);
 }
 
 TEST(PieceLevelSet, TakesLessThanHalfOfACopyWithBorders) {

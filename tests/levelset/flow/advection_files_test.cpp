@@ -49,7 +49,8 @@ TEST(AdvectionFiles, KeepAMapBitForBit) {
     const FlowMap read = readFlowMap(folder.file("map.vdb"));
     EXPECT_EQ(read.bricks, kept.bricks);
     EXPECT_EQ(read.lattice.indexToWorld.linear, kept.lattice.indexToWorld.linear);
-    for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(read.displacement[c]->values, kept.displacement[c]->values);
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_EQ(read.displacement[c]->values(), kept.displacement[c]->values());
   }
 }
 
@@ -117,7 +118,7 @@ TEST(AdvectionFiles, CarryAllGridsOfASimulation) {
   const auto a = velocityOf(read), b = velocityOf(back);
   for (std::size_t c = 0; c < 3; ++c) {
     const auto before = toBricks(a[c]), after = toBricks(b[c]);
-    EXPECT_LT(length(before->indexToWorld.translation - after->indexToWorld.translation), 1e-5f);
+    EXPECT_LT(length(before->indexToWorld().translation - after->indexToWorld().translation), 1e-5f);
     for (int i = 0; i < 29; ++i) ASSERT_EQ(before->at({i, 14, i}), after->at({i, 14, i}));
   }
 }

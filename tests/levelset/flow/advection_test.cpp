@@ -38,10 +38,10 @@ Grid softBallGrid(float radius, const Affine& map = voxels(1), const Vec3f& cent
 
 template <class Body>
 void forVoxels(const BrickGrid& grid, const Body& body) {
-  for (int z = 0; z < grid.brickCount.z * 8; ++z)
-    for (int y = 0; y < grid.brickCount.y * 8; ++y)
-      for (int x = 0; x < grid.brickCount.x * 8; ++x) {
-        const Vec3i voxel = grid.firstBrick * 8 + Vec3i{x, y, z};
+  for (int z = 0; z < grid.brickCount().z * 8; ++z)
+    for (int y = 0; y < grid.brickCount().y * 8; ++y)
+      for (int x = 0; x < grid.brickCount().x * 8; ++x) {
+        const Vec3i voxel = grid.firstBrick() * 8 + Vec3i{x, y, z};
         if (grid.poolIndex(brickOf(voxel)) != 0) body(voxel, grid.at(voxel));
       }
 }
@@ -194,7 +194,7 @@ TEST(Advection, IsTheSameForTurnedVoxels) {
     std::vector<double> differences;
     forVoxels(*b, [&](const Vec3i& v, float value) {
       if (value > 0.02f && (v.x + v.y + v.z) % 5 == 0) {
-        const Vec3f p = b->indexToWorld(Vec3f(v));
+        const Vec3f p = b->indexToWorld()(Vec3f(v));
         differences.push_back(double(std::abs(fieldA(p) - value)));
       }
     });
@@ -207,7 +207,7 @@ TEST(Advection, CarriesSeveralGridsOnVoxelsOfTheirOwn) {
   for (const Method method : kMethods) {
     const AdvectedGrids moved =
         advectGrids({coarse, fine}, VectorField(Vec3f{4, 0, 0}), {.method = method, .steps = 2});
-    EXPECT_EQ(moved.grids[0]->voxelSize, 2);
+    EXPECT_EQ(moved.grids[0]->voxelSize(), 2);
     double worst = 0;
     forVoxels(*coarse, [&](const Vec3i& v, float value) {
       worst = std::max(worst, double(std::abs(moved.grids[0]->at(v + Vec3i{4, 0, 0}) - value)));
@@ -227,8 +227,8 @@ TEST(Advection, ContinuesAMapAsIfItHadNeverStopped) {
     frame = advectGrids({ball}, stirring(), {.steps = 3, .rebakeShare = {}, .startMap = frame.map});
   EXPECT_EQ(frame.map->bricks, atOnce.map->bricks);
   for (std::size_t c = 0; c < 3; ++c)
-    EXPECT_EQ(frame.map->displacement[c]->values, atOnce.map->displacement[c]->values);
-  EXPECT_EQ(frame.grids[0]->values, atOnce.grids[0]->values);
+    EXPECT_EQ(frame.map->displacement[c]->values(), atOnce.map->displacement[c]->values());
+  EXPECT_EQ(frame.grids[0]->values(), atOnce.grids[0]->values());
 }
 
 TEST(Advection, DoesNotDependOnTheThreads) {
@@ -237,7 +237,7 @@ TEST(Advection, DoesNotDependOnTheThreads) {
     std::vector<float> values[2];
     for (int run = 0; run < 2; ++run) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, run == 0 ? 1 : 4);
-      values[run] = advectGrids({ball}, stirring(), {.method = method, .steps = 3}).grids[0]->values;
+      values[run] = advectGrids({ball}, stirring(), {.method = method, .steps = 3}).grids[0]->values();
     }
     EXPECT_EQ(values[0], values[1]) << int(method);
   }

@@ -32,16 +32,16 @@ void forVoxels(int last, const Body& body) {
 }
 
 bool same(const BrickGrid& a, const BrickGrid& b) {
-  return a.table == b.table && a.firstBrick == b.firstBrick && a.brickCount == b.brickCount &&
-         a.values.size() == b.values.size() && a.ranges.size() == b.ranges.size() &&
-         std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)) == 0 &&
-         std::memcmp(a.ranges.data(), b.ranges.data(), a.ranges.size() * sizeof(Interval)) == 0;
+  return a.table() == b.table() && a.firstBrick() == b.firstBrick() && a.brickCount() == b.brickCount() &&
+         a.values().size() == b.values().size() && a.ranges().size() == b.ranges().size() &&
+         std::memcmp(a.values().data(), b.values().data(), a.values().size() * sizeof(float)) == 0 &&
+         std::memcmp(a.ranges().data(), b.ranges().data(), a.ranges().size() * sizeof(Interval)) == 0;
 }
 
 TEST(Bake, HoldsTheFieldAtVoxelCentresBitForBit) {
   const ScalarField field = ball({0.1f, -0.2f, 0.3f}, 1.0f);
   const auto grid = bakeGrid(field, {.voxelSize = 0.07f, .box = cube(1.4f)});
-  forVoxels(20, [&](const Vec3i& v) { ASSERT_EQ(grid->at(v), field(grid->indexToWorld(Vec3f(v)))); });
+  forVoxels(20, [&](const Vec3i& v) { ASSERT_EQ(grid->at(v), field(grid->indexToWorld()(Vec3f(v)))); });
 }
 
 TEST(Bake, SparseEqualsDenseInsideTheBand) {
@@ -87,10 +87,10 @@ TEST(Bake, EvaluatesExactlyTheBricksThatTheBandEnters) {
   const auto grid = bakeGrid(field, {.voxelSize = h, .box = cube(60), .band = {-2, 2}});
   // Every brick by its own exact range over the samples 0 to 8 that its cells interpolate between.
   std::size_t entered = 0;
-  const Vec3i last = grid->firstBrick + grid->brickCount;
-  for (int z = grid->firstBrick.z; z < last.z; ++z)
-    for (int y = grid->firstBrick.y; y < last.y; ++y)
-      for (int x = grid->firstBrick.x; x < last.x; ++x) {
+  const Vec3i last = grid->firstBrick() + grid->brickCount();
+  for (int z = grid->firstBrick().z; z < last.z; ++z)
+    for (int y = grid->firstBrick().y; y < last.y; ++y)
+      for (int x = grid->firstBrick().x; x < last.x; ++x) {
         const Vec3f low = Vec3f(Vec3i{x, y, z} * 8);
         const Interval range = field.range(Box{low, low + Vec3f{8, 8, 8}}.intersection(cube(60)));
         entered += range.min < 2 && range.max > -2;
@@ -116,7 +116,7 @@ TEST(Bake, SettlesOnTheNearerEndOfTheBand) {
   const auto grid = bakeGrid(ball({}, 40.0f), {.voxelSize = 1, .box = cube(60), .band = {-2, 3}});
   EXPECT_EQ(grid->at({0, 0, 0}), 3.0f);
   EXPECT_EQ(grid->at({55, 0, 0}), -2.0f);
-  EXPECT_EQ(grid->background, -2.0f);
+  EXPECT_EQ(grid->background(), -2.0f);
   EXPECT_EQ(grid->at({500, 0, 0}), -2.0f);
 }
 
@@ -215,9 +215,9 @@ TEST(Bake, BakesVectorsOnGridsOfOneLayout) {
   const auto f = [](const Vec3f& p) { return Vec3f{p.x * p.y, 2 - p.z, p.x > 0.5f ? 1.0f : 0.0f}; };
   const VectorField field = bake(functionField(f), {.voxelSize = 0.1f, .box = cube(1)});
   const VectorGrids grids = gridsOf(field);
-  EXPECT_EQ(grids[0]->table, grids[2]->table);
+  EXPECT_EQ(grids[0]->table(), grids[2]->table());
   forVoxels(10, [&](const Vec3i& v) {
-    const Vec3f truth = f(grids[0]->indexToWorld(Vec3f(v)));
+    const Vec3f truth = f(grids[0]->indexToWorld()(Vec3f(v)));
     for (int c = 0; c < 3; ++c) ASSERT_EQ(grids[c]->at(v), truth[c]);
   });
   EXPECT_THROW(bake(functionField(f), {.voxelSize = 0.1f, .box = cube(1), .band = {0, 1}}), Error);

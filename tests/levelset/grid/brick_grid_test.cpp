@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "nephele/levelset/grid/brick_ranges.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/brick_grids.h"
@@ -36,8 +37,8 @@ TEST(BrickGrid, RangesHoldEveryStoredSample) {
   const auto grid = denseGrid(
       {0, 0, 0}, {2, 1, 1}, [](const Vec3i& v) { return v.x + 100 * v.z; }, {}, -3.0f);
   // Brick 2 owns x = 8 to 15, z = 0 to 7, and its border holds the background.
-  EXPECT_EQ(grid->ranges[2], (Interval{-3.0f, 15.0f + 700.0f}));
-  EXPECT_EQ(grid->ranges[0], Interval::of(-3.0f));
+  EXPECT_EQ(grid->ranges()[2], (Interval{-3.0f, 15.0f + 700.0f}));
+  EXPECT_EQ(grid->ranges()[0], Interval::of(-3.0f));
 }
 
 TEST(BrickGrid, RangeOfABrickWithoutFiniteValuesIsEverything) {
@@ -55,14 +56,14 @@ TEST(BrickGrid, RangeOfABrickWithoutFiniteValuesIsEverything) {
 TEST(BrickGrid, SharedBricksAreNotPlacedAndKeepTheirSamples) {
   auto grid = denseGrid({0, 0, 0}, {4, 1, 1}, scatter);
   // Position 0 is background, 1 and 2 share brick 2, 3 has its own.
-  grid->table = {0, 2, 2, 4};
+  grid->setTable({0, 2, 2, 4});
   std::fill_n(grid->brick(2), BrickGrid::kVolume, 5.0f);
   fillBorders(*grid);
   const auto placed = placedBricks(*grid);
   ASSERT_EQ(placed.size(), 1u);
   EXPECT_EQ(placed[0].pool, 4);
   EXPECT_EQ(placed[0].brick, (Vec3i{3, 0, 0}));
-  EXPECT_EQ(grid->ranges[2], Interval::of(5.0f));
+  EXPECT_EQ(grid->ranges()[2], Interval::of(5.0f));
   EXPECT_EQ(grid->brick(4)[sampleOffset(-1, 0, 0)], 5.0f);
 }
 
@@ -70,7 +71,7 @@ TEST(BrickGrid, CountsActiveVoxelsStrictlyInsideTheBand) {
   auto grid = denseGrid({0, 0, 0}, {2, 1, 1}, [](const Vec3i& v) { return v.x; });
   // x = 3 to 11 lie strictly between 2 and 12; each stands for 8 x 8 voxels.
   EXPECT_EQ(activeVoxelCount(*grid, {2.0f, 12.0f}), 9u * 64u);
-  grid->table = {1, 1};
+  grid->setTable({1, 1});
   EXPECT_EQ(activeVoxelCount(*grid, {2.0f, 12.0f}), 2u * 5u * 64u);
 }
 
@@ -83,39 +84,47 @@ TEST(BrickGrid, KnowsItsBoxAndSize) {
 
 TEST(BrickGrid, PackingKeepsSamplesWithinHalfACode) {
   const auto grid = denseGrid({-1, 0, 2}, {2, 2, 2}, scatter, {}, 7.0f);
-  BrickGrid packed = *grid;
-  pack(packed);
-  EXPECT_TRUE(packed.isPacked());
-  EXPECT_TRUE(packed.values.empty());
+  const PackedGrid packed(*grid);
   EXPECT_LT(packed.memoryBytes(), 0.55 * double(grid->memoryBytes()));
-  EXPECT_EQ(packed.ranges, grid->ranges);
+  EXPECT_EQ(packed.ranges(), grid->ranges());
   for (int z = 16; z < 32; ++z)
     for (int y = 0; y < 16; ++y)
       for (int x = -8; x < 8; ++x) {
-        const Interval range = grid->ranges[std::size_t(grid->poolIndex(brickOf(Vec3i{x, y, z})))];
+        const Interval range = grid->ranges()[std::size_t(grid->poolIndex(brickOf(Vec3i{x, y, z})))];
         ASSERT_NEAR(packed.at({x, y, z}), grid->at({x, y, z}), (range.max - range.min) / 131070.0f + 1e-6f);
       }
   EXPECT_EQ(packed.at({100, 0, 0}), 7.0f);
 }
 
-TEST(BrickGrid, PackedGridsAreRefusedWhereSamplesAreReadOrWritten) {
-  // They hold no samples: writing them would be out of bounds.
-  auto grid = denseGrid({0, 0, 0}, {2, 1, 1}, scatter);
-  pack(*grid);
-  EXPECT_THROW(fillBorders(*grid), Error);
-  EXPECT_THROW(activeVoxelCount(*grid, {-1, 1}), Error);
-  EXPECT_THROW(toVdb(*grid, {"density"}), Error);
+TEST(BrickGrid, RefusesTablesThatDoNotFit) {
+  BrickGrid grid({}, {{0, 0, 0}, {2, 1, 1}});
+  grid.append(1);
+  for (const std::vector<std::int32_t>& table : {std::vector{0}, {0, 1, 0}, {0, 2}, {-1, 0}})
+    EXPECT_THROW(grid.setTable(table), Error);
+  grid.setTable({1, 0});
+  EXPECT_EQ(grid.poolIndex({0, 0, 0}), 1);
+  EXPECT_THROW(BrickGrid({{}, {}, 0.0f}, {{}, {1, 1, 1}}), Error);
+  EXPECT_THROW(BrickGrid({}, {{}, {1 << 11, 1 << 11, 1 << 11}}), Error);
+  EXPECT_THROW(BrickGrid({}, {{}, {1, -1, 1}}), Error);
+}
+
+TEST(BrickGrid, MultipliesSamplesRangesAndBackground) {
+  auto grid = denseGrid(
+      {0, 0, 0}, {1, 1, 1}, [](const Vec3i& v) { return float(v.x); }, {}, 3.0f);
+  grid->multiply(-2.0f);
+  EXPECT_EQ(grid->at({3, 0, 0}), -6.0f);
+  EXPECT_EQ(grid->at({9, 0, 0}), -6.0f);
+  EXPECT_EQ(grid->ranges()[1], (Interval{-14, 0}));
 }
 
 TEST(BrickGrid, PackingKeepsConstantsExactlyAndRefusesWhatIsNotFinite) {
   auto grid = denseGrid(
       {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return 0.1f; }, {}, 0.1f);
-  BrickGrid packed = *grid;
-  pack(packed);
+  const PackedGrid packed(*grid);
   EXPECT_EQ(packed.at({3, 4, 5}), 0.1f);
   grid->brick(1)[sampleOffset(3, 4, 5)] = std::numeric_limits<float>::infinity();
   fillBorders(*grid);
-  EXPECT_THROW(pack(*grid), Error);
+  EXPECT_THROW(PackedGrid{*grid}, Error);
 }
 
 TEST(BrickRanges, AreExactForSmallRegionsAndContainLargeOnes) {
@@ -129,11 +138,11 @@ TEST(BrickRanges, AreExactForSmallRegionsAndContainLargeOnes) {
       low[a] = first[a] + int(random() % unsigned(count[a]));
       high[a] = low[a] + int(random() % unsigned(first[a] + count[a] - low[a]));
     }
-    Interval hull = grid->ranges[std::size_t(grid->poolIndex(low))];
+    Interval hull = grid->ranges()[std::size_t(grid->poolIndex(low))];
     for (int z = low.z; z <= high.z; ++z)
       for (int y = low.y; y <= high.y; ++y)
         for (int x = low.x; x <= high.x; ++x)
-          hull = hull.hull(grid->ranges[std::size_t(grid->poolIndex({x, y, z}))]);
+          hull = hull.hull(grid->ranges()[std::size_t(grid->poolIndex({x, y, z}))]);
     const Interval found = ranges.over(low, high);
     ASSERT_TRUE(found.contains(hull));
     if (high.x - low.x < 4 && high.y - low.y < 4 && high.z - low.z < 4) {

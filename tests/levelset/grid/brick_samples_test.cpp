@@ -25,19 +25,16 @@ TEST(BrickSamples, PackToWhatTheWholeGridPacksTo) {
   for (const Interval band : {Interval{-0.2f, 0.1f}, Interval::everything()}) {
     const BakeOptions options{
         .voxelSize = 0.03f, .box = kBox, .band = band, .interpolation = Interpolation::tricubic};
-    const auto whole = bakeGrid(wavy, options);
-    pack(*whole);
+    const auto whole = std::make_shared<const PackedGrid>(std::move(*bakeGrid(wavy, options)));
     const auto packed = detail::packed(detail::bakeSamples(wavy, options));
-    ASSERT_EQ(packed->firstBrick, whole->firstBrick);
-    ASSERT_EQ(packed->brickCount, whole->brickCount);
+    ASSERT_EQ(packed->firstBrick(), whole->firstBrick());
+    ASSERT_EQ(packed->brickCount(), whole->brickCount());
     EXPECT_EQ(packed->poolSize(), whole->poolSize());
     // The pools differ in their order only.
-    for (std::size_t i = 0; i < whole->table.size(); ++i) {
-      const auto a = std::size_t(packed->table[i]), b = std::size_t(whole->table[i]);
-      ASSERT_EQ(packed->ranges[a], whole->ranges[b]);
-      ASSERT_TRUE(std::equal(packed->codes.begin() + std::ptrdiff_t(a * BrickGrid::kVolume),
-                             packed->codes.begin() + std::ptrdiff_t((a + 1) * BrickGrid::kVolume),
-                             whole->codes.begin() + std::ptrdiff_t(b * BrickGrid::kVolume)));
+    for (std::size_t i = 0; i < whole->table().size(); ++i) {
+      const std::int32_t a = packed->table()[i], b = whole->table()[i];
+      ASSERT_EQ(packed->ranges()[std::size_t(a)], whole->ranges()[std::size_t(b)]);
+      ASSERT_TRUE(std::equal(packed->codes(a), packed->codes(a) + BrickGrid::kVolume, whole->codes(b)));
     }
   }
 }
@@ -109,10 +106,10 @@ TEST(BrickMemo, EvaluatesTheSamplesOfBricksOnce) {
   const auto first = bakeGrid(memo.field(), kBallOptions);
   const int once = counted->count;
   EXPECT_GT(once, 0);
-  EXPECT_EQ(bakeGrid(memo.field(), kBallOptions)->values, first->values);
+  EXPECT_EQ(bakeGrid(memo.field(), kBallOptions)->values(), first->values());
   EXPECT_EQ(counted->count, once);
   memo.clear();
-  EXPECT_EQ(bakeGrid(memo.field(), kBallOptions)->values, first->values);
+  EXPECT_EQ(bakeGrid(memo.field(), kBallOptions)->values(), first->values());
   EXPECT_EQ(counted->count, 2 * once);
 }
 

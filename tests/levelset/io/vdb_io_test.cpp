@@ -35,28 +35,22 @@ VdbGrid ballGrid(double voxelSize) {
 /// A grid of 3 x 3 x 3 bricks: ramp in the middle brick, the constant `inner` in the one after it along x,
 /// `outer` in the others.
 BrickGrid smallGrid(float outer, float inner) {
-  BrickGrid grid;
-  grid.background = outer;
-  grid.firstBrick = {-1, -1, -1};
-  grid.brickCount = {3, 3, 3};
-  grid.table.assign(27, 0);
-  grid.values.assign(3 * BrickGrid::kVolume, outer);
-  std::fill_n(grid.values.begin() + BrickGrid::kVolume, BrickGrid::kVolume, inner);
-  grid.ranges = {Interval::of(outer), Interval::of(inner), Interval{}};
-  grid.table[grid.tableIndex({0, 0, 0})] = 2;
-  grid.table[grid.tableIndex({1, 0, 0})] = 1;
-  float* own = grid.brick(2);
+  BrickGrid grid({}, {{-1, -1, -1}, {3, 3, 3}}, outer);
+  grid.place({1, 0, 0}, grid.appendConstant(inner));
+  const std::int32_t ramp = grid.appendConstant(outer);
+  grid.place({0, 0, 0}, ramp);
+  float* own = grid.brick(ramp);
   for (int z = 0; z < 8; ++z)
     for (int y = 0; y < 8; ++y)
       for (int x = 0; x < 8; ++x)
         own[((z + 1) * 11 + y + 1) * 11 + x + 1] = 0.01f * float(x + 10 * y + 100 * z + 1);
-  grid.ranges[2] = {std::min(outer, 0.01f), std::max(outer, 7.78f)};
+  grid.setRange(ramp, {std::min(outer, 0.01f), std::max(outer, 7.78f)});
   return grid;
 }
 
 void expectSameSamples(const BrickGrid& a, const BrickGrid& b) {
-  const Vec3i low = min(a.firstBrick, b.firstBrick),
-              high = max(a.firstBrick + a.brickCount, b.firstBrick + b.brickCount);
+  const Vec3i low = min(a.firstBrick(), b.firstBrick()),
+              high = max(a.firstBrick() + a.brickCount(), b.firstBrick() + b.brickCount());
   for (int z = low.z * 8 - 2; z < high.z * 8 + 2; ++z)
     for (int y = low.y * 8 - 2; y < high.y * 8 + 2; ++y)
       for (int x = low.x * 8 - 2; x < high.x * 8 + 2; ++x)
@@ -72,17 +66,17 @@ TEST(VdbIo, LevelSetComesBackBitForBitThroughAFile) {
   EXPECT_LT(describe(read).valueMin, 0.0f);  // In the file: negative inside.
   EXPECT_FLOAT_EQ(describe(read).background, 0.15f);
   const auto after = toBricks(read);
-  EXPECT_EQ(before->background, after->background);
+  EXPECT_EQ(before->background(), after->background());
   expectSameSamples(*before, *after);
 }
 
 TEST(VdbIo, BricksHoldTheirNeighboursBorderSamples) {
   // Every stored sample of every brick equals the grid's sample at its voxel.
   const auto grid = toBricks(meshToLevelSet(icosphere(1.0, 3), {.voxelSize = 0.08}));
-  for (int bz = 0; bz < grid->brickCount.z; ++bz)
-    for (int by = 0; by < grid->brickCount.y; ++by)
-      for (int bx = 0; bx < grid->brickCount.x; ++bx) {
-        const Vec3i b = grid->firstBrick + Vec3i{bx, by, bz};
+  for (int bz = 0; bz < grid->brickCount().z; ++bz)
+    for (int by = 0; by < grid->brickCount().y; ++by)
+      for (int bx = 0; bx < grid->brickCount().x; ++bx) {
+        const Vec3i b = grid->firstBrick() + Vec3i{bx, by, bz};
         const float* samples = grid->brick(grid->poolIndex(b));
         for (int z = 0; z < 11; ++z)
           for (int y = 0; y < 11; ++y)
@@ -129,17 +123,17 @@ TEST(VdbIo, TransformsComeBack) {
   BrickGrid bricks = smallGrid(0.0f, 1.0f);
   for (const Mat3f& linear : {Mat3f::scaling(0.25f), Mat3f::rotation({1, 2, 3}, 0.7f) * Mat3f::scaling(0.5f),
                               Mat3f{{0.5f, 0.1f, 0.0f, 0.0f, 0.25f, 0.0f, -0.1f, 0.0f, 1.0f}}}) {
-    bricks.indexToWorld = {linear, {3, -4, 5}};
+    bricks.setLattice(Lattice::of({linear, {3, -4, 5}}));
     writeVdbFile(folder.file("t.vdb"), {toVdb(bricks, {"density", Class::fogVolume})}, {});
     const VdbGrid read = readScalarGrid(folder.file("t.vdb"));
     const auto back = toBricks(read);
     for (int i = 0; i < 9; ++i)
-      EXPECT_NEAR(back->indexToWorld.linear.m[std::size_t(i)], linear.m[std::size_t(i)], 1e-6f);
-    EXPECT_NEAR(length(back->indexToWorld.translation - Vec3f(3, -4, 5)), 0.0f, 1e-6f);
-    EXPECT_NEAR(back->voxelSize, std::cbrt(determinant(linear)), 1e-6f);
+      EXPECT_NEAR(back->indexToWorld().linear.m[std::size_t(i)], linear.m[std::size_t(i)], 1e-6f);
+    EXPECT_NEAR(length(back->indexToWorld().translation - Vec3f(3, -4, 5)), 0.0f, 1e-6f);
+    EXPECT_NEAR(back->voxelSize(), std::cbrt(determinant(linear)), 1e-6f);
     EXPECT_EQ(describe(read).uniform, linear == Mat3f::scaling(0.25f));
     const Vec3f p(1.5f, 2.5f, -3.5f);
-    EXPECT_NEAR(length(back->worldToIndex(back->indexToWorld(p)) - p), 0.0f, 1e-5f);
+    EXPECT_NEAR(length(back->worldToIndex()(back->indexToWorld()(p)) - p), 0.0f, 1e-5f);
   }
 }
 
@@ -149,12 +143,12 @@ TEST(VdbIo, GridsFarFromTheOriginKeepTheirPlaceOrAreRefused) {
   const TemporaryFolder folder;
   BrickGrid bricks = smallGrid(0.0f, 1.0f);
   const auto readAt = [&](float voxel, float x) {
-    bricks.indexToWorld = {Mat3f::scaling(voxel), {x, 0, 0}};
+    bricks.setLattice(Lattice::of({Mat3f::scaling(voxel), {x, 0, 0}}));
     writeVdbFile(folder.file("far.vdb"), {toVdb(bricks, {"density", Class::fogVolume})}, {});
     return toBricks(readScalarGrid(folder.file("far.vdb")));
   };
-  EXPECT_EQ(readAt(1.0f, 1e5f)->indexToWorld(Vec3f{3, 0, 0}).x, 100003.0f);
-  EXPECT_NEAR(readAt(0.01f, 100.0f)->indexToWorld(Vec3f{3, 0, 0}).x, 100.03f, 1e-5f);
+  EXPECT_EQ(readAt(1.0f, 1e5f)->indexToWorld()(Vec3f{3, 0, 0}).x, 100003.0f);
+  EXPECT_NEAR(readAt(0.01f, 100.0f)->indexToWorld()(Vec3f{3, 0, 0}).x, 100.03f, 1e-5f);
   const std::string message = errorOf([&] { readAt(0.01f, 1e5f); });
   for (const char* part : {"'density'", "100000", "0.01"})
     EXPECT_NE(message.find(part), std::string::npos) << message;
@@ -303,9 +297,9 @@ TEST(VdbIo, ReadsVolumesMadeElsewhere) {
     // Bricks hold the same extremes: the sign turned for level sets.
     const auto bricks = toBricks(grid);
     const float sign = k.gridClass == Class::levelSet ? -1.0f : 1.0f;
-    EXPECT_EQ(bricks->background, sign * info.background);
-    Interval range = Interval::of(bricks->background);
-    for (const Interval& r : bricks->ranges) range = range.hull(r);
+    EXPECT_EQ(bricks->background(), sign * info.background);
+    Interval range = Interval::of(bricks->background());
+    for (const Interval& r : bricks->ranges()) range = range.hull(r);
     EXPECT_TRUE(range.contains(sign * info.valueMin) && range.contains(sign * info.valueMax));
   }
 }
@@ -345,7 +339,7 @@ TEST(VdbIo, AnEmptyGridReadsAsBackground) {
   EXPECT_EQ(describe(grid).activeVoxels, 0u);
   const auto bricks = toBricks(grid);
   EXPECT_EQ(bricks->at({1, 2, 3}), 0.0f);
-  EXPECT_EQ(bricks->table.size(), 0u);
+  EXPECT_EQ(bricks->table().size(), 0u);
 }
 
 TEST(VdbIo, BadFilesNameThemselvesAndWhatIsWrong) {

@@ -17,7 +17,7 @@ TEST(VdbVectors, AreReadAsThreeGrids) {
     EXPECT_EQ(info.activeVoxels, 9047u);
     EXPECT_FLOAT_EQ(info.background, 1.0f);
     const auto bricks = toBricks(parts[std::size_t(c)]);
-    EXPECT_EQ(bricks->background, 1.0f);
+    EXPECT_EQ(bricks->background(), 1.0f);
     const Vec3i voxel{-3, 7, 5};
     EXPECT_NEAR(bricks->at(voxel), 0.1f * float(voxel[c]), 1e-6f);
     EXPECT_NEAR(bricks->at({12, 4, 2}), c == 0 ? 1.2f : c == 1 ? 0.4f : 0.2f, 1e-6f);
@@ -33,8 +33,9 @@ TEST(VdbVectors, OfStaggeredGridsStandOnTheFaces) {
     const auto bricks = toBricks(parts[std::size_t(axis)]);
     Vec3f shift{};
     shift[axis] = -0.5f;
-    const Vec3f expected = density->indexToWorld(shift);
-    for (int c = 0; c != 3; ++c) EXPECT_NEAR(bricks->indexToWorld({0, 0, 0})[c], expected[c], 1e-5f) << axis;
+    const Vec3f expected = density->indexToWorld()(shift);
+    for (int c = 0; c != 3; ++c)
+      EXPECT_NEAR(bricks->indexToWorld()({0, 0, 0})[c], expected[c], 1e-5f) << axis;
   }
 }
 

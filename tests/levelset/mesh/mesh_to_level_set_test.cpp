@@ -22,17 +22,17 @@ namespace {
 /// Calls visit(value, world position) for every own sample of every brick that is not constant.
 template <class Visit>
 void forEachSample(const BrickGrid& grid, const Visit& visit) {
-  for (int bz = 0; bz < grid.brickCount.z; ++bz)
-    for (int by = 0; by < grid.brickCount.y; ++by)
-      for (int bx = 0; bx < grid.brickCount.x; ++bx) {
-        const Vec3i b = grid.firstBrick + Vec3i{bx, by, bz};
+  for (int bz = 0; bz < grid.brickCount().z; ++bz)
+    for (int by = 0; by < grid.brickCount().y; ++by)
+      for (int bx = 0; bx < grid.brickCount().x; ++bx) {
+        const Vec3i b = grid.firstBrick() + Vec3i{bx, by, bz};
         const std::int32_t pool = grid.poolIndex(b);
-        if (grid.ranges[std::size_t(pool)].isPoint()) continue;
+        if (grid.ranges()[std::size_t(pool)].isPoint()) continue;
         for (int z = 0; z < 8; ++z)
           for (int y = 0; y < 8; ++y)
             for (int x = 0; x < 8; ++x)
               visit(grid.brick(pool)[((z + 1) * 11 + y + 1) * 11 + x + 1],
-                    grid.indexToWorld(Vec3f(Vec3i{b.x * 8 + x, b.y * 8 + y, b.z * 8 + z})));
+                    grid.indexToWorld()(Vec3f(Vec3i{b.x * 8 + x, b.y * 8 + y, b.z * 8 + z})));
       }
 }
 
@@ -116,8 +116,8 @@ TEST(MeshToLevelSet, VerticesNeedNotBeShared) {
   const Mesh mesh = icosphere(1.0, 4);
   const auto shared = toBricks(meshToLevelSet(mesh, {.voxelSize = 0.05}));
   const auto soup = toBricks(meshToLevelSet(unshared(mesh), {.voxelSize = 0.05}));
-  EXPECT_EQ(shared->table, soup->table);
-  EXPECT_EQ(shared->values, soup->values);
+  EXPECT_EQ(shared->table(), soup->table());
+  EXPECT_EQ(shared->values(), soup->values());
 }
 
 TEST(MeshToLevelSet, OverlappingPartsBecomeTheirUnion) {
@@ -150,10 +150,11 @@ TEST(MeshToLevelSet, SignAgreesWithOpenVdbAwayFromTheSurface) {
   const auto ours = toBricks(*band, Beside::constant);
   const auto theirs = toBricks(detail::floodedBand(mesh, options, silent()));
   std::size_t compared = 0, different = 0;
-  for (int z = -8; z < 8 * ours->brickCount.z; ++z)
-    for (int y = 0; y < 8 * ours->brickCount.y; y += 3)
-      for (int x = 0; x < 8 * ours->brickCount.x; x += 3) {
-        const Vec3i v{ours->firstBrick.x * 8 + x, ours->firstBrick.y * 8 + y, ours->firstBrick.z * 8 + z};
+  for (int z = -8; z < 8 * ours->brickCount().z; ++z)
+    for (int y = 0; y < 8 * ours->brickCount().y; y += 3)
+      for (int x = 0; x < 8 * ours->brickCount().x; x += 3) {
+        const Vec3i v{ours->firstBrick().x * 8 + x, ours->firstBrick().y * 8 + y,
+                      ours->firstBrick().z * 8 + z};
         const float a = ours->at(v), b = theirs->at(v);
         if (std::abs(a) < 0.9 * options.voxelSize) continue;
         ++compared;
@@ -168,7 +169,7 @@ TEST(MeshToLevelSet, IsTheSameAtAnyThreadCount) {
   std::vector<std::vector<float>> results;
   for (const std::size_t threads : {1u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    results.push_back(toBricks(meshToLevelSet(mesh, {.voxelSize = 0.03}))->values);
+    results.push_back(toBricks(meshToLevelSet(mesh, {.voxelSize = 0.03}))->values());
   }
   EXPECT_EQ(results[0], results[1]);
 }

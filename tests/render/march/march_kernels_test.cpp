@@ -46,7 +46,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
     const Vec3f origin =
         Vec3f{std::sin(i * 0.9f), std::cos(i * 1.9f), std::sin(i * 0.4f)} * 0.8f - direction * 1.2f;
     MarchRay ray;
-    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, direction);
+    ray.density = through(grid->worldToIndex(), grid->firstBrick(), origin, direction);
     ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, direction);
     ray.scattered = through(toSky, {}, origin, direction);
     ray.length = 2.5f;
@@ -91,7 +91,7 @@ TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
   for (int i = 0; i != 40; ++i) {
     MarchRay ray{};
     const Vec3f origin{-0.9f + 0.045f * float(i), 0.1f, 2};
-    ray.density = through(grid->worldToIndex, grid->firstBrick, origin, {0, 0, -1});
+    ray.density = through(grid->worldToIndex(), grid->firstBrick(), origin, {0, 0, -1});
     ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, {0, 0, -1});
     ray.start = 7;
     ray.length = 4;

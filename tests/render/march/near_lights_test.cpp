@@ -283,8 +283,8 @@ TEST(NearLights, VectorsAgreeWithTheScalarLoop) {
     const Vec3f origin =
         Vec3f{std::sin(i * 0.9f), std::cos(i * 1.9f), std::sin(i * 0.4f)} * 0.8f - direction * 1.2f;
     MarchRay ray;
-    const Vec3f at = grid->worldToIndex(origin) - Vec3f(grid->firstBrick * 8);
-    ray.density = {at, grid->worldToIndex.linear * direction};
+    const Vec3f at = grid->worldToIndex()(origin) - Vec3f(grid->firstBrick() * 8);
+    ray.density = {at, grid->worldToIndex().linear * direction};
     ray.length = 2.5f;
     ray.jitter = 0.3f;
     for (std::size_t l = 0; l != lights.size(); ++l) {

@@ -42,8 +42,7 @@ Vec3f pixel(const Image& image, const std::string& layer = "") {
 
 std::shared_ptr<BrickGrid> times(const BrickGrid& grid, float factor) {
   auto result = std::make_shared<BrickGrid>(grid);
-  for (float& value : result->values) value *= factor;
-  for (Interval& range : result->ranges) range = {range.min * factor, range.max * factor};
+  result->multiply(factor);
   return result;
 }
 
@@ -257,9 +256,9 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
   const LightVolume& light = sun.light;
   MarchScene scene = test::sceneOf(volume, sun);
   const auto set = [](const VolumeColour::Grids& grids, MarchScene::ColourBricks& bricks) {
-    for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values.data();
-    bricks.table = grids[0]->table.data();
-    bricks.count = grids[0]->brickCount;
+    for (std::size_t c = 0; c != 3; ++c) bricks.values[c] = grids[c]->values().data();
+    bricks.table = grids[0]->table().data();
+    bricks.count = grids[0]->brickCount();
   };
   set(volume.colour().scattering, scene.colour);
   set(volume.colour().emission, scene.emission);
@@ -278,8 +277,8 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
     const Vec3f origin =
         Vec3f{std::sin(i * 0.9f), std::cos(i * 1.9f), std::sin(i * 0.4f)} * 0.8f - direction * 1.2f;
     MarchRay ray;
-    ray.density = {grid->worldToIndex(origin) - Vec3f(grid->firstBrick * 8),
-                   grid->worldToIndex.linear * direction};
+    ray.density = {grid->worldToIndex()(origin) - Vec3f(grid->firstBrick() * 8),
+                   grid->worldToIndex().linear * direction};
     ray.suns[0] = {light.worldToLattice()(origin) - Vec3f(light.firstBrick() * 8),
                    light.worldToLattice().linear * direction};
     ray.scattered = {toGlow(origin), toGlow.linear * direction};

@@ -103,8 +103,8 @@ TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
         nodes.insert(nodes.end(), row, row + kWidth);
       }
   test::forEachTarget([&] {
-    const CodedBricks coded(*grid), inPlace(nodes, grid->table);
-    for (std::size_t place = 0; place != grid->table.size(); ++place) {
+    const CodedBricks coded(*grid), inPlace(nodes, grid->table());
+    for (std::size_t place = 0; place != grid->table().size(); ++place) {
       ASSERT_EQ(coded.entries()[place].first, expected.entries()[place].first);
       ASSERT_EQ(coded.entries()[place].unit, expected.entries()[place].unit);
       ASSERT_EQ(inPlace.entries()[place].unit, expected.entries()[place].unit);

@@ -103,8 +103,8 @@ TEST(FieldVolume, VoxelsGrowUntilTheyFitTheMemory) {
   FieldVolumeOptions options = around(1.2f);
   options.mostBytes = 4e6;
   const RenderVolume volume = fieldVolume(cotton(), camera, options);
-  EXPECT_LE(double(volume.density().values.size()) * 4, 4e6 * 1.3);
-  EXPECT_GE(double(volume.density().values.size()) * 4, 4e6 * 0.3);
+  EXPECT_LE(double(volume.density().values().size()) * 4, 4e6 * 1.3);
+  EXPECT_GE(double(volume.density().values().size()) * 4, 4e6 * 0.3);
   // A camera inside of the density asks for infinitely small voxels.
   EXPECT_GT(fieldVoxelSize(cotton(), looking({0, 0, 0.5f}, 100, 50), options), 0.01f);
 }

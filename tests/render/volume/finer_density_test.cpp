@@ -30,7 +30,7 @@ std::shared_ptr<BrickGrid> bumps() {
 // Points within the cells of the voxels of `bumps`.
 Vec3f pointOf(const BrickGrid& grid, int i) {
   const Vec3f t{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)};
-  return grid.indexToWorld({0.5f + 11.9f * t.x, 4.5f + 9.9f * t.y, 9.4f * t.z});
+  return grid.indexToWorld()({0.5f + 11.9f * t.x, 4.5f + 9.9f * t.y, 9.4f * t.z});
 }
 
 TEST(FinerDensity, HasTheSameValuesEverywhere) {
@@ -38,7 +38,7 @@ TEST(FinerDensity, HasTheSameValuesEverywhere) {
   const ScalarField coarse = gridField(grid);
   for (const int factor : {1, 2, 4, 8}) {
     const auto finer = finerDensity(*grid, factor);
-    EXPECT_FLOAT_EQ(finer->voxelSize, grid->voxelSize / float(factor));
+    EXPECT_FLOAT_EQ(finer->voxelSize(), grid->voxelSize() / float(factor));
     const ScalarField fine = gridField(finer);
     // Single precision: values up to 2, places up to a hundred voxels.
     for (int i = 0; i != 2000; ++i) {
@@ -50,17 +50,14 @@ TEST(FinerDensity, HasTheSameValuesEverywhere) {
 
 TEST(FinerDensity, KeepsSharedBricksAndEmptiness) {
   // Three bricks in a row: one constant twice, and nothing.
-  auto grid = std::make_shared<BrickGrid>();
-  grid->brickCount = {3, 1, 1};
-  grid->table = {1, 0, 1};
-  grid->values.assign(2 * BrickGrid::kVolume, 0.0f);
-  std::fill(grid->values.begin() + BrickGrid::kVolume, grid->values.end(), 0.5f);
-  grid->ranges = {Interval::of(0), Interval::of(0.5f)};
+  auto grid = std::make_shared<BrickGrid>(Lattice{}, BrickBox{{}, {3, 1, 1}});
+  grid->appendConstant(0.5f);
+  grid->setTable({1, 0, 1});
   const auto fine = finerDensity(*grid, 2);
   EXPECT_EQ(fine->poolSize(), 2u);
-  ASSERT_EQ(fine->table.size(), 24u);
-  for (std::size_t i = 0; i != 24; ++i) EXPECT_EQ(fine->table[i], i % 6 / 2 == 1 ? 0 : 1) << i;
-  EXPECT_EQ(fine->ranges[1], Interval::of(0.5f));
+  ASSERT_EQ(fine->table().size(), 24u);
+  for (std::size_t i = 0; i != 24; ++i) EXPECT_EQ(fine->table()[i], i % 6 / 2 == 1 ? 0 : 1) << i;
+  EXPECT_EQ(fine->ranges()[1], Interval::of(0.5f));
 }
 
 TEST(FinerDensity, MakesShadowsMoreExact) {

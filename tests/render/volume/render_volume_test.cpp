@@ -36,12 +36,12 @@ TEST(RenderVolume, KnowsTheDistanceToTheNextDensity) {
   });
   const RenderVolume volume(grid);
   std::size_t entry = 0;
-  for (int z = 0; z != grid->brickCount.z; ++z)
-    for (int y = 0; y != grid->brickCount.y; ++y)
-      for (int x = 0; x != grid->brickCount.x; ++x, ++entry) {
+  for (int z = 0; z != grid->brickCount().z; ++z)
+    for (int y = 0; y != grid->brickCount().y; ++y)
+      for (int x = 0; x != grid->brickCount().x; ++x, ++entry) {
         int nearest = 1000;
         for (const Vec3i& brick : volume.occupiedBricks()) {
-          const Vec3i d = brick - grid->firstBrick - Vec3i{x, y, z};
+          const Vec3i d = brick - grid->firstBrick() - Vec3i{x, y, z};
           nearest = std::min(nearest, std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}));
         }
         ASSERT_EQ(int(volume.emptiness()[entry]), nearest) << x << " " << y << " " << z;
@@ -54,10 +54,10 @@ TEST(RenderVolume, KnowsHowFarItIsConstant) {
                              {.voxelSize = 1.0f, .box = {{-60, -60, -60}, {60, 60, 60}}, .background = 0.0f});
   const RenderVolume volume(grid);
   std::set<std::int32_t> constants;
-  for (std::size_t entry = 0; entry != grid->table.size(); ++entry)
-    if (volume.uniformity()[entry] != 0) constants.insert(grid->table[entry]);
+  for (std::size_t entry = 0; entry != grid->table().size(); ++entry)
+    if (volume.uniformity()[entry] != 0) constants.insert(grid->table()[entry]);
   ASSERT_EQ(constants.size(), 1u);
-  const Vec3i n = grid->brickCount;
+  const Vec3i n = grid->brickCount();
   int most = 0;
   for (int z = 0; z != n.z; ++z)
     for (int y = 0; y != n.y; ++y)
@@ -67,7 +67,7 @@ TEST(RenderVolume, KnowsHowFarItIsConstant) {
         for (int k = 0; k != n.z; ++k)
           for (int j = 0; j != n.y; ++j)
             for (int i = 0; i != n.x; ++i)
-              if (!constants.contains(grid->table[(std::size_t(k) * n.y + j) * n.x + i]))
+              if (!constants.contains(grid->table()[(std::size_t(k) * n.y + j) * n.x + i]))
                 nearest = std::min(nearest, std::max({std::abs(i - x), std::abs(j - y), std::abs(k - z)}));
         most = std::max(most, nearest);
         ASSERT_EQ(int(volume.uniformity()[entry]), nearest) << x << " " << y << " " << z;
@@ -103,10 +103,7 @@ TEST(RenderVolume, IsEmptyWhereNothingIsAboveZero) {
   const RenderVolume volume(densityGrid(voxels(1), {0, 0, 0}, {9, 9, 9}, [](const Vec3f&) { return -1.0f; }));
   EXPECT_TRUE(volume.isEmpty());
   EXPECT_TRUE(volume.worldBounds().isEmpty());
-  BrickGrid nothing;
-  nothing.values.assign(BrickGrid::kVolume, 0.0f);
-  nothing.ranges.assign(1, Interval::of(0));
-  EXPECT_TRUE(RenderVolume(std::make_shared<BrickGrid>(nothing)).isEmpty());
+  EXPECT_TRUE(RenderVolume(std::make_shared<BrickGrid>()).isEmpty());
 }
 
 TEST(RenderVolume, KnowsTheDensityThatLightMeets) {
@@ -117,8 +114,7 @@ TEST(RenderVolume, KnowsTheDensityThatLightMeets) {
 }
 
 TEST(RenderVolume, RefusesWhatHasNoPicture) {
-  auto unbounded = ball(1.0f, 0.5f);
-  unbounded->background = 0.5f;
+  const auto unbounded = std::make_shared<BrickGrid>(Lattice{}, BrickBox{}, 0.5f);
   EXPECT_THROW(RenderVolume{unbounded}, Error);
   EXPECT_THROW(RenderVolume(densityGrid(voxels(1), {0, 0, 0}, {3, 3, 3}, [](const Vec3f&) { return NAN; })),
                Error);

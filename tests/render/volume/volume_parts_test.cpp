@@ -96,7 +96,7 @@ TEST(VolumeParts, OverlappingSlabsAddTheirOpticalDepths) {
     });
   };
   const RenderVolume volume = combine({part(slabOf(0.1f, 0.7f)), part(slabOf(0.0625f, 0.4f), 0.5f)});
-  EXPECT_FLOAT_EQ(volume.density().voxelSize, 0.0625f);
+  EXPECT_FLOAT_EQ(volume.density().voxelSize(), 0.0625f);
   const Camera camera = Camera::lookingAt({0, 0, 9}, {0, 0, 0}, {0, 1, 0}, {1, 1, 0.001f});
   Medium medium;
   medium.extinction = 0.8f;
@@ -118,7 +118,7 @@ TEST(VolumeParts, TurnedAndStretchedGridsStandWhereTheyAre) {
         return 2 * std::fmin(1.0f, std::fmax(0.0f, (0.9f - length(p - centre)) / 0.1f + 0.5f));
       });
   const RenderVolume volume = combine({part(turned), part(ball(0.2f, 0.05f, 1e-6f))});
-  ASSERT_FLOAT_EQ(volume.density().voxelSize, 0.05f);
+  ASSERT_FLOAT_EQ(volume.density().voxelSize(), 0.05f);
   double mass = 0;
   Vec3d moment{};
   for (int z = -40; z <= 40; ++z)
@@ -126,7 +126,7 @@ TEST(VolumeParts, TurnedAndStretchedGridsStandWhereTheyAre) {
       for (int x = -40; x <= 40; ++x) {
         const double value = double(volume.density().at({x, y, z}));
         mass += value;
-        moment += Vec3d(volume.density().indexToWorld(Vec3f(Vec3i{x, y, z}))) * value;
+        moment += Vec3d(volume.density().indexToWorld()(Vec3f(Vec3i{x, y, z}))) * value;
       }
   EXPECT_NEAR(mass * 0.05 * 0.05 * 0.05, 2 * 4.0 / 3 * 3.14159265 * 0.9 * 0.9 * 0.9, 0.05);
   for (int axis = 0; axis != 3; ++axis) EXPECT_NEAR(moment[axis] / mass, double(centre[axis]), 2e-3);
@@ -210,8 +210,8 @@ TEST(VolumeParts, AreTheSameAtAnyNumberOfThreads) {
   const RenderVolume all = combine(parts);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const RenderVolume alone = combine(parts);
-  EXPECT_EQ(all.density().table, alone.density().table);
-  EXPECT_EQ(all.density().values, alone.density().values);
+  EXPECT_EQ(all.density().table(), alone.density().table());
+  EXPECT_EQ(all.density().values(), alone.density().values());
 }
 
 TEST(VolumeParts, EmptyPartsAddNothing) {
@@ -249,8 +249,7 @@ TEST(VolumeParts, RefusesWhatHasNoMeaning) {
   bad.shutter = {};
   bad.temperatureScale = 1;
   EXPECT_NO_THROW(combine({bad}));
-  auto unbounded = ball(0.5f, 0.1f);
-  unbounded->background = 1;
+  const auto unbounded = std::make_shared<BrickGrid>(Lattice{}, BrickBox{}, 1.0f);
   EXPECT_THROW(combine({part(grid), part(unbounded)}), Error);
   const auto broken = densityGrid(voxels(1), {0, 0, 0}, {3, 3, 3}, [](const Vec3f&) { return NAN; });
   EXPECT_THROW(combine({part(grid), part(broken)}), Error);

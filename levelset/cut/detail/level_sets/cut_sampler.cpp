@@ -63,8 +63,8 @@ BrickPoints::BrickPoints(const Vec3i& brick, float voxelSize, Scratch& scratch, 
 std::shared_ptr<const BrickGrid> gridInPlace(const ScalarField& shape, float voxelSize) {
   std::shared_ptr<const BrickGrid> grid = gridOf(shape);
   const Affine places{Mat3f::scaling(voxelSize), {}};
-  const bool isInPlace = grid && !grid->isPacked() && grid->indexToWorld.linear == places.linear &&
-                         grid->indexToWorld.translation == places.translation;
+  const bool isInPlace = grid && grid->indexToWorld().linear == places.linear &&
+                         grid->indexToWorld().translation == places.translation;
   return isInPlace ? grid : nullptr;
 }
 

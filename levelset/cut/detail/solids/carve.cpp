@@ -18,6 +18,7 @@
 #include "nephele/levelset/cut/detail/solids/cut_source.h"
 #include "nephele/levelset/cut/detail/solids/surface_arrangement.h"
 #include "nephele/levelset/grid/disjoint_sets.h"
+#include "nephele/levelset/mesh/winding_number.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 

@@ -15,6 +15,7 @@
 
 #include "nephele/levelset/cut/detail/solids/cut_source.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/mesh/winding_number.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -300,18 +301,6 @@ PlaneFrame PlaneFrame::of(const Vec3d& normal) {
   const Vec3d u =
       normalize(std::abs(normal.y) < 0.9 ? cross(Vec3d{0, 1, 0}, normal) : cross(Vec3d{0, 0, 1}, normal));
   return {u, cross(normal, u)};
-}
-
-double windingNumber(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
-                     const Vec3d& point) {
-  // Solid angles: van Oosterom and Strackee, 1983.
-  double sum = 0;
-  for (const TriangleIndices& t : triangles) {
-    const Vec3d a = positions[t[0]] - point, b = positions[t[1]] - point, c = positions[t[2]] - point;
-    const double la = length(a), lb = length(b), lc = length(c);
-    sum += std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-  }
-  return sum / (2 * M_PI);
 }
 
 std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid) {

@@ -40,8 +40,4 @@ class CutSource;
 /// is so wide that a solid's sides cross themselves.
 std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid);
 
-/// How often a closed surface winds around a point, not on it. Cost: linear.
-double windingNumber(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
-                     const Vec3d& point);
-
 }  // namespace nephele::detail

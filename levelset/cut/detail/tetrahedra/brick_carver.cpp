@@ -90,7 +90,7 @@ void BrickCarver::addFacet(const Vec3i& cell, const std::array<unsigned, 4>& cor
   }
   if (ring_.size() > 1 && ring_.front() == ring_.back()) ring_.pop_back();
   if (ring_.size() < 3) return;
-  const bool isMirrored = isOdd != (determinant(carving_.level.indexToWorld.linear) < 0);
+  const bool isMirrored = isOdd != (determinant(carving_.level.indexToWorld().linear) < 0);
   if (isMirrored) std::reverse(ring_.begin(), ring_.end());
   places_.clear();
   for (const VertexKey& key : ring_) places_.push_back(placeOf(key));

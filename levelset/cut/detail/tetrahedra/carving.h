@@ -58,11 +58,11 @@ struct Carving {
     return 2.5 * longestEdge * (isDistance ? 1.0 : double(knives[knife].knife.steepest));
   }
   Vec3d world(const Vec3d& index) const {
-    const auto& m = level.indexToWorld.linear.m;
+    const auto& m = level.indexToWorld().linear.m;
     return Vec3d{double(m[0]) * index.x + double(m[1]) * index.y + double(m[2]) * index.z,
                  double(m[3]) * index.x + double(m[4]) * index.y + double(m[5]) * index.z,
                  double(m[6]) * index.x + double(m[7]) * index.y + double(m[8]) * index.z} +
-           Vec3d(level.indexToWorld.translation);
+           Vec3d(level.indexToWorld().translation);
   }
 };
 

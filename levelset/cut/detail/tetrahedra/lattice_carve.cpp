@@ -38,8 +38,7 @@ class LatticeCarver {
       : carving_{.level = level, .knives = knives, .halfKerf = double(kerf) / 2}, progress_(progress) {
     require(knives.size() * carving_.functionsPerKnife() < kMostFunctions,
             fmt::format("cut: too many knives for a level set: {}", knives.size()));
-    require(!level.isPacked(), "cut: the level set must not be packed");
-    require(level.background <= 0, "cut: the level set does not end: its background is inside");
+    require(level.background() <= 0, "cut: the level set does not end: its background is inside");
     for (unsigned corner = 1; corner < 8; ++corner)
       carving_.longestEdge = std::max(
           carving_.longestEdge, length(carving_.world(Vec3d(cornerOffset(corner))) - carving_.world({})));
@@ -53,7 +52,7 @@ class LatticeCarver {
       }
     }
     // One layer of bricks before the table: its last cells lie between the background and the table.
-    places_ = {level.firstBrick - Vec3i{1, 1, 1}, level.brickCount + Vec3i{1, 1, 1}};
+    places_ = {level.firstBrick() - Vec3i{1, 1, 1}, level.brickCount() + Vec3i{1, 1, 1}};
   }
 
   Carved run() {
@@ -90,7 +89,7 @@ class LatticeCarver {
       carving_.largest = std::max(carving_.largest, block.largest);
       std::move(block.bricks.begin(), block.bricks.end(), std::back_inserter(bricks_));
     }
-    carving_.margin = kZeroMargin * std::min(double(carving_.level.voxelSize), carving_.largest);
+    carving_.margin = kZeroMargin * std::min(double(carving_.level.voxelSize()), carving_.largest);
     table_.assign(places_.size(), -1);
     for (std::size_t i = 0; i < bricks_.size(); ++i)
       table_[places_.numberOf(bricks_[i].at)] = std::int32_t(i);
@@ -120,7 +119,7 @@ class LatticeCarver {
         for (int x = firstBrick.x; x < end.x; ++x) {
           const Vec3i at{x, y, z};
           const Interval range = rangeOfCells(at);
-          const bool hasSurface = !(double(range.min) > kZeroMargin * double(carving_.level.voxelSize));
+          const bool hasSurface = !(double(range.min) > kZeroMargin * double(carving_.level.voxelSize()));
           if (!(range.max > 0) && !std::isnan(range.max)) continue;
           if (!isDecided) decide(all, boxOf(firstBrick, kBlock));
           isDecided = true;
@@ -139,10 +138,10 @@ class LatticeCarver {
 
   /// Of all samples of the brick's cells.
   Interval rangeOfCells(const Vec3i& at) const {
-    Interval range = carving_.level.ranges[std::size_t(carving_.level.poolIndex(at))];
+    Interval range = carving_.level.ranges()[std::size_t(carving_.level.poolIndex(at))];
     for (unsigned corner = 1; corner < 8; ++corner) {
       const Interval other =
-          carving_.level.ranges[std::size_t(carving_.level.poolIndex(at + cornerOffset(corner)))];
+          carving_.level.ranges()[std::size_t(carving_.level.poolIndex(at + cornerOffset(corner)))];
       range = {std::min(range.min, other.min), std::max(range.max, other.max)};
     }
     return range;
