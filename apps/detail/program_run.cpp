@@ -125,7 +125,8 @@ void ProgramRun::draw(double fraction) const {
     const double share =
         expectedStages_ > 0 ? std::clamp(passed / expectedStages_, 0.0, 1.0) : 1 - std::pow(0.5, passed);
     const double whole = from_ + (to_ - from_) * share;
-    const int percent = int(whole * 100);
+    // The last line is that of `finish`.
+    const int percent = std::min(99, int(whole * 100));
     if (percent > farmPercent_) {
       farmPercent_ = percent;
       fmt::print("ALF_PROGRESS {}%\n", percent);
