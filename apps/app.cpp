@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+// All of CLI11 here alone: the others take CLI/App.hpp, or each would compile its formatter and its reader of
+// configuration files again.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
 #include <iostream>

@@ -4,6 +4,8 @@ target_compile_options(nephele_flags INTERFACE
   -fno-math-errno -fno-trapping-math -ffp-contract=off
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
   $<$<BOOL:${NEPHELE_WARNINGS_AS_ERRORS}>:-Werror>)
+# Kernels are compiled for SSE4, AVX2, AVX-512 and without any of them; what SSSE3 would add to the last is not worth the time.
+target_compile_definitions(nephele_flags INTERFACE HWY_DISABLED_TARGETS=HWY_SSSE3)
 
 if(NEPHELE_SANITIZE STREQUAL "address")
   add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined)

@@ -34,11 +34,8 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
   addCount(app, "--roughness-octaves", a.octaves, 1, 12,
            "Sizes of hills: each half as large and half as high as the one before.")
       ->needs(roughness);
-  app.add_option("--knife", a.knifeFiles,
-                 "Cut by the surface of a closed mesh or a level set (.vdb); may be given again.")
-      ->type_name("FILE")
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  addInputs(app, "--knife", a.knifeFiles,
+            "Cut by the surface of a closed mesh or a level set (.vdb); may be given again.");
   auto* voronoi = addCount(app, "--voronoi", a.cellCount, 1, 1000000,
                            "Cut into the Voronoi cells of this many points, scattered inside.")
                       ->default_str("");

@@ -24,6 +24,14 @@ double number(const std::string& option, const std::string& text, const std::str
   return *parsed;
 }
 
+/// A Length or Frequency in `part` of the value `text`, relative where `suffix` ends it; at least `low`.
+template <class Quantity>
+Quantity quantity(const std::string& option, const std::string& text, const std::string& part, char suffix,
+                  double low, const std::string& form) {
+  const bool relative = part.ends_with(suffix);
+  return {number(option, text, part.substr(0, part.size() - (relative ? 1 : 0)), low, 1e9, form), relative};
+}
+
 void addFalloff(CLI::App& app, DensityArguments& a) {
   app.add_option_function<std::string>(
          "--edge-falloff",
@@ -51,11 +59,7 @@ void addInteriorNoise(CLI::App& app, DensityArguments& a) {
            const auto [amount, frequency] = halves(text);
            a.interiorNoise = number("--interior-noise", text, amount, 0, 2, form);
            if (frequency.empty() && text.find(',') == std::string::npos) return;
-           const bool relative = frequency.ends_with('x');
-           const double value =
-               number("--interior-noise", text, frequency.substr(0, frequency.size() - (relative ? 1 : 0)),
-                      1e-9, 1e9, form);
-           a.interiorFrequency = {value, relative};
+           a.interiorFrequency = quantity<Frequency>("--interior-noise", text, frequency, 'x', 1e-9, form);
          },
          fmt::format("Variation of the density inside, rms, and the frequency of its largest clumps "
                      "(default {:g}x).",
@@ -72,16 +76,10 @@ void addFlatBase(CLI::App& app, DensityArguments& a) {
                "the longest side (5%), and a length > 0";
            a.base = text == "off" ? DensityArguments::Base::off : DensityArguments::Base::given;
            if (text == "off") return;
-           const auto length = [&](const std::string& part, double low) -> Length {
-             const bool relative = part.ends_with('%');
-             return {number("--flat-base", text, part.substr(0, part.size() - (relative ? 1 : 0)), low, 1e9,
-                            form),
-                     relative};
-           };
            const auto [height, softness] = halves(text);
-           a.flatBase = length(height, -1e9);
+           a.flatBase = quantity<Length>("--flat-base", text, height, '%', -1e9, form);
            if (!softness.empty() || text.find(',') != std::string::npos)
-             a.flatBaseSoftness = length(softness, 1e-9);
+             a.flatBaseSoftness = quantity<Length>("--flat-base", text, softness, '%', 1e-9, form);
          },
          fmt::format("Cut the underside flat: no density below HEIGHT, all of it SOFTNESS (default {:g}%) "
                      "above. Standard with --species: {:g}%,{:g}%; else off.",

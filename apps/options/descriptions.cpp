@@ -1,6 +1,6 @@
 #include "apps/options/descriptions.h"
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <filesystem>
 
 #include "nephele/levelset/io/mesh_io.h"

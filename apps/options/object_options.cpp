@@ -30,16 +30,10 @@ bool hasCoordinates(const Mesh& mesh) {
 
 void addObjectOptions(CLI::App& app, ObjectOptions& options) {
   CLI::Option* object =
-      app.add_option("--object", options.objects,
-                     "Opaque object beside the volume: a mesh, or a level set (.vdb); may be given again.")
-          ->type_name("FILE")
-          ->allow_extra_args(false)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option("--holdout-object", options.holdouts,
-                 "The same as a holdout: hides what is behind it, and is not seen itself.")
-      ->type_name("FILE")
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      addInputs(app, "--object", options.objects,
+                "Opaque object beside the volume: a mesh, or a level set (.vdb); may be given again.");
+  addInputs(app, "--holdout-object", options.holdouts,
+            "The same as a holdout: hides what is behind it, and is not seen itself.");
   addNumbers(
       app, "--object-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
       "Share of the light that objects scatter.")

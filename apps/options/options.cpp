@@ -189,6 +189,14 @@ CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& targ
   return option;
 }
 
+CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,
+                       const std::string& description) {
+  return app.add_option(name, target, description)
+      ->type_name("FILE")
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
 CLI::Option* addRepair(CLI::App& app, MeshRepairOptions::Mode& target) {
   using Mode = MeshRepairOptions::Mode;
   return addChoice<Mode>(

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <functional>
 #include <optional>
 #include <string>
@@ -92,6 +92,10 @@ CLI::Option* addChoice(CLI::App& app, const std::string& name, T& target,
 /// The output file; `extensions` are the ones allowed ({".obj", ".ply"}).
 CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& target,
                        const std::vector<std::string>& extensions, const std::string& description);
+
+/// A list of input files, each with the option in front.
+CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,
+                       const std::string& description);
 
 /// --repair, the same for every verb that takes a mesh.
 CLI::Option* addRepair(CLI::App& app, MeshRepairOptions::Mode& target);
