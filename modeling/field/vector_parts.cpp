@@ -10,14 +10,10 @@ namespace nephele {
 namespace {
 
 using detail::component;
+using detail::constantNode;
 using detail::constantOf;
 using detail::rangeComponent;
 using Frame = Scratch::Frame;
-
-template <class T>
-NodePtr<T> constantNode(const T& value) {
-  return std::make_shared<detail::ConstantNode<T>>(value);
-}
 
 // ---- Choosing and joining lanes
 

@@ -232,11 +232,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
-namespace {
 
 HWY_EXPORT(cellNoiseKernel);
-
-}  // namespace
 
 float cellNoiseScalar(const LatticeNoise& noise, const Vec3f& point, Vec3f* gradient) {
   return HWY_NAMESPACE::evaluateOne(HWY_NAMESPACE::evaluateCell<float>, noise, point, gradient);

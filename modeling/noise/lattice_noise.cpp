@@ -208,9 +208,9 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace nephele::detail {
 
-namespace {
-
 HWY_EXPORT(latticeNoiseKernel);
+
+namespace {
 
 bool isCellNoise(LatticeKind kind) {
   return kind == LatticeKind::worley || kind == LatticeKind::worleyDifference || kind == LatticeKind::gabor;

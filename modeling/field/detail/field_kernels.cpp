@@ -301,12 +301,13 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
-namespace {
 
 HWY_EXPORT(unaryLanes);
 HWY_EXPORT(unaryGradLanes);
 HWY_EXPORT(binaryLanes);
 HWY_EXPORT(binaryGradLanes);
+
+namespace {
 
 bool isPlainLoop(Unary op) {
   return op >= Unary::tangent && op <= Unary::arcTangent;

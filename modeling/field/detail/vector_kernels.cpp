@@ -61,14 +61,11 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
-namespace {
 
 HWY_EXPORT(productLanes);
 HWY_EXPORT(length3Lanes);
 HWY_EXPORT(normalize3Lanes);
 HWY_EXPORT(affine3Lanes);
-
-}  // namespace
 
 void product(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
   HWY_DYNAMIC_DISPATCH(productLanes)(a, b, sign, accumulate, out, count);

@@ -216,10 +216,11 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
-namespace {
 
 HWY_EXPORT(perlinKernel);
 HWY_EXPORT(perlinGradKernel);
+
+namespace {
 
 float lerpScalar(float a, float b, float t) {
   return a + t * (b - a);

@@ -45,12 +45,9 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
-namespace {
 
 HWY_EXPORT(valueLanes);
 HWY_EXPORT(gradLanes);
-
-}  // namespace
 
 void shapeLanes(const ShapeKind& kind, const PointBlock& points, float* values) {
   HWY_DYNAMIC_DISPATCH(valueLanes)(kind, points, values);
