@@ -19,11 +19,16 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
   if(NEPHELE_WITH_CGAL)
     find_package(CGAL REQUIRED)
   endif()
-  find_package(embree 3 REQUIRED)
+  if(NEPHELE_WITH_EMBREE)
+    find_package(embree 3 REQUIRED)
+  endif()
 
   # Debian's OpenVDB installs its find module, but not on CMake's path.
   list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
+  # It sets this variable unless CGAL was found before.
+  set(nephele_shared_libraries ${BUILD_SHARED_LIBS})
   find_package(OpenVDB 10 REQUIRED)
+  set(BUILD_SHARED_LIBS ${nephele_shared_libraries})
   list(REMOVE_ITEM CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
   find_path(NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h REQUIRED)
 endif()

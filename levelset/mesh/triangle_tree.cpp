@@ -16,6 +16,11 @@ bool TriangleTree::BoundingBox::meets(const BoundingBox& other) const {
          low.z <= other.high.z && other.low.z <= high.z;
 }
 
+double TriangleTree::BoundingBox::squaredDistanceTo(const Vec3d& p) const {
+  const Vec3d away = p - max(low, min(p, high));
+  return dot(away, away);
+}
+
 TriangleTree::TriangleTree(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
                            std::uint32_t first, std::uint32_t last) {
   std::vector<BoundingBox> boxes;
@@ -110,6 +115,31 @@ bool TriangleTree::meetsBox(const Vec3d& low, const Vec3d& high) const {
       if (boxes_[i].meets(box)) return true;
   }
   return false;
+}
+
+void TriangleTree::visitNear(const Vec3d& p, double reach,
+                             const std::function<void(std::uint32_t, double&)>& visit) const {
+  if (isEmpty()) return;
+  const auto isNear = [&](double squared) { return reach >= 0 && squared <= reach * reach; };
+  // With their squared distances, so that those beyond what has been found since are left out.
+  std::vector<std::pair<std::uint32_t, double>> open{{0, nodes_[0].box.squaredDistanceTo(p)}};
+  while (!open.empty()) {
+    const auto [index, squared] = open.back();
+    open.pop_back();
+    if (!isNear(squared)) continue;
+    const Node& node = nodes_[index];
+    if (node.isLeaf) {
+      for (std::uint32_t i = node.first; i < node.last; ++i)
+        if (isNear(boxes_[i].squaredDistanceTo(p))) visit(triangles_[i], reach);
+      continue;
+    }
+    // The nearer child on top: what it holds may rule out the other.
+    std::pair<std::uint32_t, double> near{node.first, nodes_[node.first].box.squaredDistanceTo(p)},
+        far{node.last, nodes_[node.last].box.squaredDistanceTo(p)};
+    if (far.second < near.second) std::swap(near, far);
+    open.push_back(far);
+    open.push_back(near);
+  }
 }
 
 }  // namespace nephele::detail

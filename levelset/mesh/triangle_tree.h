@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -25,11 +26,16 @@ class TriangleTree {
                  std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) const;
   /// Whether the box of any triangle meets this one.
   bool meetsBox(const Vec3d& low, const Vec3d& high) const;
+  /// Calls `visit` with every triangle whose box is within `reach` of `p`, and with `reach`, which it may
+  /// lessen.
+  void visitNear(const Vec3d& p, double reach,
+                 const std::function<void(std::uint32_t triangle, double& reach)>& visit) const;
 
  private:
   struct BoundingBox {
     Vec3d low, high;
     bool meets(const BoundingBox& other) const;
+    double squaredDistanceTo(const Vec3d& p) const;
   };
   struct Node {
     BoundingBox box;
