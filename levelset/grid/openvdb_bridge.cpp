@@ -151,14 +151,14 @@ LeafOrTile<float> leafOfSamples(const float* samples, int rowLength, int sliceLe
                                 const std::string& name) {
   float values[kBrickSamples];
   transpose(samples, rowLength, sliceLength, values);
-  requireFinite(values, kBrickSamples, name);
   for (float& value : values) value = treeValues(value);
+  requireFinite(values, kBrickSamples, name);
   return leafOf(values, origin, [&](float value) { return treeValues.isActive(value); });
 }
 
 LeafOrTile<float> tileOf(float constant, const TreeValues& values, const std::string& name) {
-  requireFinite(&constant, 1, name);
   const float value = values(constant);
+  requireFinite(&value, 1, name);
   return {nullptr, value, values.isActive(value)};
 }
 

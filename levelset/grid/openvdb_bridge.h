@@ -76,7 +76,7 @@ struct TreeValues {
 openvdb::FloatGrid::Ptr toOpenVdb(const BrickGrid& bricks, const TreeValues& values, const std::string& name);
 openvdb::FloatGrid::Ptr toOpenVdb(VoxelGrid<float>&& voxels, const TreeValues& values,
                                   const std::string& name);
-/// Voxels that are not of the background are active.
+/// Voxels of bricks that hold samples are active.
 openvdb::Vec3SGrid::Ptr toOpenVdb(VoxelGrid<Vec3f>&& voxels, const std::string& name);
 
 /// Lets OpenVDB's tools see that a Progress was cancelled, and reports how far they are.

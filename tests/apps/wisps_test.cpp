@@ -138,7 +138,8 @@ TEST_F(WispsVerb, IsTheSameAtAnyThreadCount) {
   ASSERT_EQ(wisps("four.vdb", options + "4").exitCode, 0);
   const auto one = readVdbFile(file("one.vdb")), four = readVdbFile(file("four.vdb"));
   EXPECT_EQ(toBricks(one[0])->values(), toBricks(four[0])->values());
-  EXPECT_EQ(toBricks(vectorComponents(one[1])[1])->values(), toBricks(vectorComponents(four[1])[1])->values());
+  EXPECT_EQ(toBricks(vectorComponents(one[1])[1])->values(),
+            toBricks(vectorComponents(four[1])[1])->values());
 }
 
 TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {

@@ -1,0 +1,104 @@
+#include "nephele/levelset/grid/voxel_grid.h"
+
+#include <gtest/gtest.h>
+
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/support/brick_grids.h"
+
+namespace nephele {
+namespace {
+
+using test::scatter;
+
+/// Bricks at x = 0 with samples and at x = 1 with the constant 2; 0.5 elsewhere.
+VoxelGrid<float> twoBricks() {
+  VoxelGrid<float> grid("test", 0.25, 0.5f);
+  float* samples = grid.add({0, 0, 0});
+  for (int i = 0; i < kBrickSamples; ++i) samples[i] = scatter({i & 7, i >> 3 & 7, i >> 6});
+  grid.setConstant({1, 0, 0}, 2.0f);
+  return grid;
+}
+
+TEST(VoxelGrid, HoldsSamplesConstantsAndTheBackground) {
+  const VoxelGrid<float> grid = twoBricks();
+  EXPECT_EQ(grid.at({3, 4, 5}), scatter({3, 4, 5}));
+  EXPECT_EQ(grid.at({8, 7, 0}), 2.0f);
+  EXPECT_EQ(grid.at({-1, 0, 0}), 0.5f);
+  EXPECT_EQ(grid.at({1 << 20, 0, 0}), 0.5f);
+  EXPECT_EQ(grid.sampledBricks(), 1u);
+  int visited = 0;
+  grid.forEachBrick([&](const Vec3i& brick, std::int32_t entry) {
+    ++visited;
+    EXPECT_EQ(entry, brick.x == 0 ? 0 : -2);
+  });
+  EXPECT_EQ(visited, 2);
+}
+
+TEST(VoxelGrid, BrickThatBecomesConstantForgetsItsSamples) {
+  VoxelGrid<float> grid = twoBricks();
+  grid.setConstant({0, 0, 0}, 0.5f);
+  EXPECT_EQ(grid.at({3, 4, 5}), 0.5f);
+  EXPECT_EQ(toBricks(grid)->at({3, 4, 5}), 0.5f);
+  // Its place is still held, but must not be written.
+  EXPECT_EQ(describe(toVdb(std::move(grid), {"a"})).activeVoxels, 512u);
+}
+
+TEST(VoxelGrid, BricksReadTheirNeighboursWhereTheyVary) {
+  const VoxelGrid<float> grid = twoBricks();
+  for (const Beside beside : {Beside::varying, Beside::constant}) {
+    const auto bricks = toBricks(grid, beside);
+    for (int z = -9; z < 17; ++z)
+      for (int y = -9; y < 17; ++y)
+        for (int x = -9; x < 17; ++x) ASSERT_EQ(bricks->at({x, y, z}), grid.at({x, y, z}));
+    const float* own = bricks->brick(bricks->poolIndex({0, 0, 0}));
+    EXPECT_EQ(own[sampleOffset(8, 3, 3)], 2.0f);
+    EXPECT_EQ(own[sampleOffset(-1, 3, 3)], 0.5f);
+    // The constant brick beside it, and the background before it.
+    const float* after = bricks->brick(bricks->poolIndex({1, 0, 0}));
+    EXPECT_EQ(after[sampleOffset(-1, 3, 3)], beside == Beside::varying ? scatter({7, 3, 3}) : 2.0f);
+    const float* before = bricks->brick(bricks->poolIndex({-1, 0, 0}));
+    EXPECT_EQ(before[sampleOffset(9, 3, 3)], beside == Beside::varying ? scatter({1, 3, 3}) : 0.5f);
+    EXPECT_EQ(bricks->voxelSize(), 0.25f);
+  }
+}
+
+TEST(VoxelGrid, ComesBackFromOpenVdb) {
+  const VoxelGrid<float> grid = twoBricks();
+  const auto back = toBricks(toVdb(twoBricks(), {"a"}));
+  for (int z = -2; z < 10; ++z)
+    for (int y = -2; y < 10; ++y)
+      for (int x = -2; x < 18; ++x) ASSERT_EQ(back->at({x, y, z}), grid.at({x, y, z}));
+
+  VoxelGrid<Vec3f> vectors("test", 0.25, Vec3f{});
+  Vec3f* samples = vectors.add({-1, 2, 0});
+  for (int i = 0; i < kBrickSamples; ++i) samples[i] = Vec3f{1, 2, 3} * float(i);
+  const VdbGrid file = toVdb(std::move(vectors), {.name = "v"});
+  EXPECT_EQ(describe(file).activeVoxels, 512u);
+  EXPECT_EQ(toVectorVoxels(file).at({-8 + 3, 16 + 4, 5}), (Vec3f{1, 2, 3} * float(3 + 8 * 4 + 64 * 5)));
+}
+
+TEST(VoxelGrid, LevelSetsTurnAndAreClampedToTheirBand) {
+  VoxelGrid<float> grid("test", 0.25, -0.75f);
+  float* samples = grid.add({0, 0, 0});
+  for (int i = 0; i < kBrickSamples; ++i) samples[i] = 0.2f * float((i & 7) - 4);
+  const VdbGridInfo info = describe(toVdb(std::move(grid), {"surface", VdbGridInfo::Class::levelSet}));
+  EXPECT_FLOAT_EQ(info.background, 0.75f);
+  EXPECT_FLOAT_EQ(info.valueMin, -0.6f);
+  // x = 0 is 0.8 outside, beyond the band.
+  EXPECT_EQ(info.activeVoxels, 7u * 64u);
+  EXPECT_THROW(toVdb(twoBricks(), {"surface", VdbGridInfo::Class::levelSet}), Error);
+  EXPECT_THROW(toVdb(twoBricks(), {"density", VdbGridInfo::Class::fogVolume}), Error);
+}
+
+TEST(VoxelGrid, RefusesWhatIsNotFiniteOrTooFarApart) {
+  VoxelGrid<float> grid = twoBricks();
+  grid.setConstant({5, 5, 5}, std::numeric_limits<float>::infinity());
+  EXPECT_THROW(toBricks(grid), Error);
+  EXPECT_THROW(toVdb(std::move(grid), {"a"}), Error);
+  VoxelGrid<float> wide = twoBricks();
+  EXPECT_THROW(wide.setConstant({1 << 27, 1 << 27, 1 << 27}, 1.0f), Error);
+}
+
+}  // namespace
+}  // namespace nephele
