@@ -9,7 +9,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "nephele/levelset/io/openvdb_instances.h"
+#include "nephele/levelset/grid/openvdb_instances.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
 #include "tests/support/density.h"
