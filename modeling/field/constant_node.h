@@ -76,6 +76,11 @@ class ConstantNode final : public FieldNode<T> {
   T value_;
 };
 
+template <class T>
+NodePtr<T> constantNode(const T& value) {
+  return std::make_shared<ConstantNode<T>>(value);
+}
+
 /// The constant behind `node`, or null.
 template <class T>
 const T* constantOf(const NodePtr<T>& node) {
@@ -92,7 +97,7 @@ NodePtr<T> constantFrom(const RangeOf<T>& range) {
     if (!r.isPoint()) return nullptr;
     component(value, c) = r.min;
   }
-  return std::make_shared<ConstantNode<T>>(value);
+  return constantNode(value);
 }
 
 }  // namespace nephele::detail

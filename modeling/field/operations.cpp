@@ -20,15 +20,11 @@ namespace {
 
 using detail::Binary;
 using detail::constantFrom;
-using detail::ConstantNode;
+using detail::constantNode;
 using detail::constantOf;
 using detail::Parameters;
 using detail::Unary;
 using Frame = Scratch::Frame;
-
-NodePtr<float> constantNode(float value) {
-  return std::make_shared<ConstantNode<float>>(value);
-}
 
 NodePtr<float> unary(Unary op, const Parameters& p, NodePtr<float> a);
 NodePtr<float> binary(Binary op, const Parameters& p, NodePtr<float> a, NodePtr<float> b);

@@ -13,14 +13,10 @@ namespace {
 using detail::Binary;
 using detail::component;
 using detail::constantFrom;
+using detail::constantNode;
 using detail::constantOf;
 using detail::rangeComponent;
 using Frame = Scratch::Frame;
-
-template <class T>
-NodePtr<T> constantNode(const T& value) {
-  return std::make_shared<detail::ConstantNode<T>>(value);
-}
 
 // ---- Vectors and matrices, component by component
 

@@ -117,14 +117,6 @@ Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
 
 Interval rangeOf(Binary op, const Parameters& p, const Interval& a, const Interval& b) {
   switch (op) {
-    case Binary::add:
-      return a + b;
-    case Binary::subtract:
-      return a - b;
-    case Binary::multiply:
-      return a * b;
-    case Binary::divide:
-      return a / b;
     case Binary::minimum:
       return nephele::min(a, b);
     case Binary::maximum:
@@ -144,8 +136,9 @@ Interval rangeOf(Binary op, const Parameters& p, const Interval& a, const Interv
       if (std::isfinite(r.max)) r.max = scalarValue(op, p, a.max, b.max) + 1e-6f * std::abs(r.max) + slack;
       return r;
     }
+    default:
+      return arithmetic(op, a, b);
   }
-  return Interval::everything();
 }
 
 }  // namespace nephele::detail
