@@ -204,8 +204,6 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace nephele::detail {
 
-HWY_EXPORT(latticeNoiseKernel);
-
 namespace {
 
 bool isCellNoise(LatticeKind kind) {
@@ -260,6 +258,8 @@ float latticeNoiseScalar(const LatticeNoise& noise, const Vec3f& point, Vec3f* g
   if (isCellNoise(noise.kind)) return cellNoiseScalar(noise, point, gradient);
   return HWY_NAMESPACE::evaluateOne(HWY_NAMESPACE::evaluateLattice<float>, noise, point, gradient);
 }
+
+HWY_EXPORT(latticeNoiseKernel);
 
 void latticeNoiseLanes(const LatticeNoise& noise, const float* const points[3], float* values,
                        float* const* grads, int count) {

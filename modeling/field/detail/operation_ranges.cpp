@@ -67,6 +67,8 @@ Interval powerRange(const Interval& a, const Interval& b) {
 Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
   const auto value = [&](float x) { return scalarValue(op, p, x); };
   switch (op) {
+    case Unary::negate:
+      return -a;
     case Unary::mask:
     case Unary::clamp:
       return {value(a.min), value(a.max)};
@@ -82,8 +84,6 @@ Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
   }
   if (a == Interval::everything()) return a;
   switch (op) {
-    case Unary::negate:
-      return -a;
     case Unary::absolute:
       return nephele::abs(a);
     case Unary::square:
