@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <type_traits>
 
 #include "nephele/modeling/base/box.h"
 
@@ -41,21 +42,8 @@ Interval sqrt(const Interval& a);
 
 /// What `range` of a field of T returns: one Interval, or one per component (rows first for matrices).
 template <class T>
-struct RangeFor;
-template <>
-struct RangeFor<float> {
-  using type = Interval;
-};
-template <>
-struct RangeFor<Vec3f> {
-  using type = std::array<Interval, 3>;
-};
-template <>
-struct RangeFor<Mat3f> {
-  using type = std::array<Interval, 9>;
-};
-template <class T>
-using RangeOf = typename RangeFor<T>::type;
+using RangeOf =
+    std::conditional_t<std::is_same_v<T, float>, Interval, std::array<Interval, sizeof(T) / sizeof(float)>>;
 
 /// The box spanned by three component ranges, and back.
 inline Box boxOf(const std::array<Interval, 3>& r) {

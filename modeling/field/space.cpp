@@ -171,17 +171,15 @@ Field<T> transformedField(const Field<T>& f, const Affine& map) {
   return Field<T>(std::make_shared<AffineNode<T>>(f.node(), toField));
 }
 
-template <class T>
-Field<T> translated(const Field<T>& f, const Vec3f& offset) {
+Affine translation(const Vec3f& offset) {
   require(isFinite(offset), "translate: the offset must be finite");
-  return transformedField(f, {Mat3f::identity(), offset});
+  return {Mat3f::identity(), offset};
 }
 
-template <class T>
-Field<T> scaled(const Field<T>& f, float factor) {
+Affine scaling(float factor) {
   require(factor > 0 && std::isfinite(factor),
           "scale: factor must be > 0 and finite, got " + std::to_string(factor));
-  return transformedField(f, {Mat3f::scaling(factor), {}});
+  return {Mat3f::scaling(factor), {}};
 }
 
 }  // namespace
@@ -205,13 +203,13 @@ MatrixField compose(const MatrixField& f, const VectorField& X) {
 }
 
 ScalarField translate(const ScalarField& f, const Vec3f& offset) {
-  return translated(f, offset);
+  return transformedField(f, translation(offset));
 }
 VectorField translate(const VectorField& f, const Vec3f& offset) {
-  return translated(f, offset);
+  return transformedField(f, translation(offset));
 }
 MatrixField translate(const MatrixField& f, const Vec3f& offset) {
-  return translated(f, offset);
+  return transformedField(f, translation(offset));
 }
 
 ScalarField rotate(const ScalarField& f, const Vec3f& axis, float radians) {
@@ -227,13 +225,13 @@ MatrixField rotate(const MatrixField& f, const Vec3f& axis, float radians) {
 }
 
 ScalarField scale(const ScalarField& f, float factor) {
-  return scaled(f, factor);
+  return transformedField(f, scaling(factor));
 }
 VectorField scale(const VectorField& f, float factor) {
-  return scaled(f, factor);
+  return transformedField(f, scaling(factor));
 }
 MatrixField scale(const MatrixField& f, float factor) {
-  return scaled(f, factor);
+  return transformedField(f, scaling(factor));
 }
 
 ScalarField transformed(const ScalarField& f, const Affine& map) {

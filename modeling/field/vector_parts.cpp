@@ -107,7 +107,7 @@ class JoinNode final : public FieldNode<R> {
       constant = constant && c;
       for (int k = 0; c && k < kPart; ++k) component(value, p * kPart + k) = component(*c, k);
     }
-    if (constant) return constantNode(value);
+    if (constant) return detail::constantNode(value);
     return std::make_shared<JoinNode>(std::move(parts));
   }
 
@@ -127,7 +127,7 @@ NodePtr<R> PickNode<R, A>::make(const Map& map, NodePtr<A> a) {
   if (const A* c = constantOf(a)) {
     R value{};
     for (int k = 0; k < kLanes; ++k) component(value, k) = component(*c, map[k]);
-    return constantNode(value);
+    return detail::constantNode(value);
   }
   if constexpr (kComponents<A> == 3 * kLanes)
     if (const auto* join = dynamic_cast<const JoinNode<A, R>*>(a.get()))
@@ -137,9 +137,30 @@ NodePtr<R> PickNode<R, A>::make(const Map& map, NodePtr<A> a) {
 
 // ---- Length and direction
 
-class LengthNode final : public FieldNode<float> {
+/// What `kOf` gives for one vector, as the node that derives from this.
+template <class R, R (*kOf)(const Vec3f&), class Node>
+class OfVectorNode : public FieldNode<R> {
  public:
-  explicit LengthNode(NodePtr<Vec3f> v) : v_(std::move(v)) {}
+  explicit OfVectorNode(NodePtr<Vec3f> v) : v_(std::move(v)) {}
+
+  NodePtr<R> restricted(Restriction& restriction) const override {
+    const auto v = restrictNode(v_, restriction);
+    return v == v_ ? nullptr : make(v);
+  }
+  float differenceStep() const override { return v_->differenceStep(); }
+
+  static NodePtr<R> make(NodePtr<Vec3f> v) {
+    if (const Vec3f* c = constantOf(v)) return detail::constantNode(kOf(*c));
+    return std::make_shared<Node>(std::move(v));
+  }
+
+ protected:
+  NodePtr<Vec3f> v_;
+};
+
+class LengthNode final : public OfVectorNode<float, nephele::length, LengthNode> {
+ public:
+  using OfVectorNode::OfVectorNode;
 
   void eval(const PointBlock& points, const BlockLanes<1>& values, Scratch& scratch) const override {
     Frame frame(scratch);
@@ -163,21 +184,11 @@ class LengthNode final : public FieldNode<float> {
     const auto v = memo.of(v_, box);
     return nephele::sqrt(nephele::square(v[0]) + nephele::square(v[1]) + nephele::square(v[2]));
   }
-  NodePtr<float> restricted(Restriction& restriction) const override {
-    const auto v = restrictNode(v_, restriction);
-    if (v == v_) return nullptr;
-    if (const Vec3f* c = constantOf(v)) return constantNode(nephele::length(*c));
-    return std::make_shared<LengthNode>(v);
-  }
-  float differenceStep() const override { return v_->differenceStep(); }
-
- private:
-  NodePtr<Vec3f> v_;
 };
 
-class NormalizeNode final : public FieldNode<Vec3f> {
+class NormalizeNode final : public OfVectorNode<Vec3f, nephele::normalize, NormalizeNode> {
  public:
-  explicit NormalizeNode(NodePtr<Vec3f> v) : v_(std::move(v)) {}
+  using OfVectorNode::OfVectorNode;
 
   void eval(const PointBlock& points, const BlockLanes<3>& values, Scratch& scratch) const override {
     Frame frame(scratch);
@@ -216,16 +227,6 @@ class NormalizeNode final : public FieldNode<Vec3f> {
     }
     return result;
   }
-  NodePtr<Vec3f> restricted(Restriction& restriction) const override {
-    const auto v = restrictNode(v_, restriction);
-    if (v == v_) return nullptr;
-    if (const Vec3f* c = constantOf(v)) return constantNode(nephele::normalize(*c));
-    return std::make_shared<NormalizeNode>(v);
-  }
-  float differenceStep() const override { return v_->differenceStep(); }
-
- private:
-  NodePtr<Vec3f> v_;
 };
 
 }  // namespace
@@ -249,13 +250,11 @@ MatrixField matrixField(const VectorField& row0, const VectorField& row1, const 
 }
 
 ScalarField length(const VectorField& v) {
-  if (const Vec3f* c = constantOf(v.node())) return nephele::length(*c);
-  return ScalarField(std::make_shared<LengthNode>(v.node()));
+  return ScalarField(LengthNode::make(v.node()));
 }
 
 VectorField normalize(const VectorField& v) {
-  if (const Vec3f* c = constantOf(v.node())) return nephele::normalize(*c);
-  return VectorField(std::make_shared<NormalizeNode>(v.node()));
+  return VectorField(NormalizeNode::make(v.node()));
 }
 
 MatrixField transpose(const MatrixField& m) {

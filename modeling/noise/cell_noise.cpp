@@ -23,10 +23,8 @@
 
 #include "nephele/modeling/noise/detail/noise_loop.h"
 
-#ifndef NEPHELE_CELL_ORDER
-#define NEPHELE_CELL_ORDER
-namespace nephele::detail {
-namespace {
+HWY_BEFORE_NAMESPACE();
+namespace nephele::detail::HWY_NAMESPACE {
 
 struct CellIndex {
   signed char x, y, z;
@@ -49,14 +47,6 @@ constexpr std::array<CellIndex, 64> nearCellsFirst() {
   return cells;
 }
 constexpr std::array<CellIndex, 64> kNearCellsFirst = nearCellsFirst();
-
-}  // namespace
-}  // namespace nephele::detail
-#endif
-
-HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
 
 template <bool kSecondNearest>
 struct Worley {
@@ -221,13 +211,9 @@ void evaluateCell(const LatticeNoise& noise, const float* const points[3], float
   }
 }
 
-void cellNoiseKernel(const LatticeNoise& noise, const float* const points[3], float* values,
-                     float* const* grads, int count) {
-  evaluateCell<Lanes>(noise, points, values, grads, count);
-}
+constexpr auto& cellNoiseKernel = evaluateCell<Lanes>;
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

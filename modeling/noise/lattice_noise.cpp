@@ -26,8 +26,7 @@
 #include "nephele/modeling/noise/detail/noise_loop.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 template <class F>
 HWY_INLINE F lerp(F a, F b, F t) {
@@ -62,13 +61,15 @@ HWY_INLINE Vector<F> gradientAt(const LatticeNoise& noise, Whole<F> h) {
              scaled(edge<F>(other), lookUp(noise.clock.sine, rate)));
 }
 
-/// The blend of 8 corners, x fastest, and its slopes where the corner values stay.
+/// The cube around a point: its 8 corners, x fastest, the blend of their values, and its slopes where they
+/// stay.
 template <class F, bool kGrad>
-struct Blend {
+struct Cube {
+  LatticeCell<F> x, y, z;
   F fade[3], slope[3];
 
-  HWY_INLINE explicit Blend(const Vector<F>& t) {
-    const F at[3] = {t.x, t.y, t.z};
+  HWY_INLINE explicit Cube(const Vector<F>& q) : x(cellOf(q.x)), y(cellOf(q.y)), z(cellOf(q.z)) {
+    const F at[3] = {x.at, y.at, z.at};
     for (int a = 0; a < 3; ++a) {
       const F s = at[a];
       fade[a] = s * s * s * (s * (s * F(6.0f) - F(15.0f)) + F(10.0f));
@@ -78,7 +79,12 @@ struct Blend {
       }
     }
   }
-  HWY_INLINE F operator()(const F* v) const {
+  HWY_INLINE Whole<F> hashOf(unsigned corner, std::uint32_t seed) const {
+    using U = Whole<F>;
+    const U row = hashRow(y.number + U(corner >> 1 & 1), z.number + U(corner >> 2), seed);
+    return hashCorner(row, x.number + U(corner & 1));
+  }
+  HWY_INLINE F blend(const F* v) const {
     const F near = lerp(lerp(v[0], v[1], fade[0]), lerp(v[2], v[3], fade[0]), fade[1]);
     const F far = lerp(lerp(v[4], v[5], fade[0]), lerp(v[6], v[7], fade[0]), fade[1]);
     return lerp(near, far, fade[2]);
@@ -87,31 +93,28 @@ struct Blend {
     const F x0 = lerp(v[1] - v[0], v[3] - v[2], fade[1]), x1 = lerp(v[5] - v[4], v[7] - v[6], fade[1]);
     const F r0 = lerp(v[0], v[1], fade[0]), r1 = lerp(v[2], v[3], fade[0]);
     const F r2 = lerp(v[4], v[5], fade[0]), r3 = lerp(v[6], v[7], fade[0]);
-    const F z = lerp(r2, r3, fade[1]) - lerp(r0, r1, fade[1]);
-    return {slope[0] * lerp(x0, x1, fade[2]), slope[1] * lerp(r1 - r0, r3 - r2, fade[2]), slope[2] * z};
+    const F alongZ = lerp(r2, r3, fade[1]) - lerp(r0, r1, fade[1]);
+    return {slope[0] * lerp(x0, x1, fade[2]), slope[1] * lerp(r1 - r0, r3 - r2, fade[2]), slope[2] * alongZ};
   }
 };
 
 struct Perlin {
   template <class F, bool kMoves, bool kGrad>
   static HWY_INLINE NoiseSample<F> at(const LatticeNoise& noise, const Vector<F>& q) {
-    using U = Whole<F>;
-    const LatticeCell<F> x = cellOf(q.x), y = cellOf(q.y), z = cellOf(q.z);
-    const Blend<F, kGrad> blend({x.at, y.at, z.at});
+    const Cube<F, kGrad> cube(q);
     F v[8];
     Vector<F> g[8];
     for (unsigned c = 0; c < 8; ++c) {
-      const unsigned i = c & 1, j = c >> 1 & 1, k = c >> 2;
-      const U row = hashRow(y.number + U(j), z.number + U(k), noise.lattice.seed);
-      g[c] = gradientAt<F, kMoves>(noise, hashCorner(row, x.number + U(i)));
-      v[c] = dot(g[c], Vector<F>{x.at - F(float(i)), y.at - F(float(j)), z.at - F(float(k))});
+      g[c] = gradientAt<F, kMoves>(noise, cube.hashOf(c, noise.lattice.seed));
+      const F i(float(c & 1)), j(float(c >> 1 & 1)), k(float(c >> 2));
+      v[c] = dot(g[c], Vector<F>{cube.x.at - i, cube.y.at - j, cube.z.at - k});
     }
     NoiseSample<F> s;
-    s.value = blend(v);
+    s.value = cube.blend(v);
     if constexpr (kGrad) {
       F gx[8], gy[8], gz[8];
       for (int c = 0; c < 8; ++c) gx[c] = g[c].x, gy[c] = g[c].y, gz[c] = g[c].z;
-      s.gradient = sum(Vector<F>{blend(gx), blend(gy), blend(gz)}, blend.slopes(v));
+      s.gradient = sum(Vector<F>{cube.blend(gx), cube.blend(gy), cube.blend(gz)}, cube.slopes(v));
     }
     return s;
   }
@@ -120,22 +123,19 @@ struct Perlin {
 struct Value {
   template <class F, bool kMoves, bool kGrad>
   static HWY_INLINE NoiseSample<F> at(const LatticeNoise& noise, const Vector<F>& q) {
-    using U = Whole<F>;
-    const LatticeCell<F> x = cellOf(q.x), y = cellOf(q.y), z = cellOf(q.z);
-    const Blend<F, kGrad> blend({x.at, y.at, z.at});
+    const Cube<F, kGrad> cube(q);
     F v[8];
     for (unsigned c = 0; c < 8; ++c) {
-      const U row = hashRow(y.number + U(c >> 1 & 1), z.number + U(c >> 2), noise.lattice.seed);
-      const U h = hashCorner(row, x.number + U(c & 1));
+      const Whole<F> h = cube.hashOf(c, noise.lattice.seed);
       v[c] = number<F>(h);
       if constexpr (kMoves) {
-        const U other = hashAgain(h), rate = rateOf(other);
+        const Whole<F> other = hashAgain(h), rate = rateOf(other);
         v[c] = v[c] * lookUp(noise.clock.cosine, rate) + number<F>(other) * lookUp(noise.clock.sine, rate);
       }
     }
     NoiseSample<F> s;
-    s.value = blend(v);
-    if constexpr (kGrad) s.gradient = blend.slopes(v);
+    s.value = cube.blend(v);
+    if constexpr (kGrad) s.gradient = cube.slopes(v);
     return s;
   }
   /// Uniform between -1 and 1, of mean 0.
@@ -196,24 +196,23 @@ void evaluateLattice(const LatticeNoise& noise, const float* const points[3], fl
   }
 }
 
-void latticeNoiseKernel(const LatticeNoise& noise, const float* const points[3], float* values,
-                        float* const* grads, int count) {
-  evaluateLattice<Lanes>(noise, points, values, grads, count);
-}
+constexpr auto& latticeNoiseKernel = evaluateLattice<Lanes>;
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace nephele::detail {
 
-HWY_EXPORT(latticeNoiseKernel);
-
 namespace {
 
 bool isCellNoise(LatticeKind kind) {
   return kind == LatticeKind::worley || kind == LatticeKind::worleyDifference || kind == LatticeKind::gabor;
+}
+
+/// Facts of a distance that is cut off at the reach of Worley noise.
+LatticeFacts distanceFacts(float mean, float rms, float steepest) {
+  return {mean, rms, -1.0001f * mean / rms, 1.0001f * (kWorleyReach - mean) / rms, steepest / rms, 0};
 }
 
 }  // namespace
@@ -229,19 +228,9 @@ LatticeFacts latticeFacts(LatticeKind kind, bool moves) {
     case LatticeKind::value:
       return {0, kValueRms, -2.4973f * more, 2.4973f * more, 9.37f * more, 1.909557f};
     case LatticeKind::worley:
-      return {kWorleyMean,
-              kWorleyRms,
-              -1.0001f * kWorleyMean / kWorleyRms,
-              1.0001f * (kWorleyReach - kWorleyMean) / kWorleyRms,
-              1.0001f / kWorleyRms,
-              0};
+      return distanceFacts(kWorleyMean, kWorleyRms, 1.0001f);
     case LatticeKind::worleyDifference:
-      return {kWorleyDifferenceMean,
-              kWorleyDifferenceRms,
-              -1.0001f * kWorleyDifferenceMean / kWorleyDifferenceRms,
-              1.0001f * (kWorleyReach - kWorleyDifferenceMean) / kWorleyDifferenceRms,
-              2.0002f / kWorleyDifferenceRms,
-              0};
+      return distanceFacts(kWorleyDifferenceMean, kWorleyDifferenceRms, 2.0002f);
     case LatticeKind::gabor:
       break;
   }
@@ -269,6 +258,8 @@ float latticeNoiseScalar(const LatticeNoise& noise, const Vec3f& point, Vec3f* g
   if (isCellNoise(noise.kind)) return cellNoiseScalar(noise, point, gradient);
   return HWY_NAMESPACE::evaluateOne(HWY_NAMESPACE::evaluateLattice<float>, noise, point, gradient);
 }
+
+HWY_EXPORT(latticeNoiseKernel);
 
 void latticeNoiseLanes(const LatticeNoise& noise, const float* const points[3], float* values,
                        float* const* grads, int count) {

@@ -21,9 +21,35 @@
 namespace nephele {
 namespace {
 
-constexpr std::array<NoiseKind, 7> kKinds{NoiseKind::perlin,           NoiseKind::simplex, NoiseKind::worley,
-                                          NoiseKind::worleyDifference, NoiseKind::value,   NoiseKind::gabor,
-                                          NoiseKind::spectral};
+using detail::LatticeKind;
+
+/// A kind, its name, and the noise of a lattice that makes it; spectral noise is made otherwise.
+struct KindRow {
+  NoiseKind kind;
+  std::string_view name;
+  LatticeKind lattice = LatticeKind::perlin;
+};
+
+constexpr std::array<KindRow, 7> kKindRows{
+    {{NoiseKind::perlin, "perlin", LatticeKind::perlin},
+     {NoiseKind::simplex, "simplex", LatticeKind::simplex},
+     {NoiseKind::worley, "worley", LatticeKind::worley},
+     {NoiseKind::worleyDifference, "worley_difference", LatticeKind::worleyDifference},
+     {NoiseKind::value, "value", LatticeKind::value},
+     {NoiseKind::gabor, "gabor", LatticeKind::gabor},
+     {NoiseKind::spectral, "fft"}}};
+
+constexpr auto kKinds = [] {
+  std::array<NoiseKind, kKindRows.size()> kinds{};
+  for (std::size_t i = 0; i < kinds.size(); ++i) kinds[i] = kKindRows[i].kind;
+  return kinds;
+}();
+
+const KindRow& rowOf(NoiseKind kind) {
+  for (const KindRow& row : kKindRows)
+    if (row.kind == kind) return row;
+  throw Error("noise: unknown kind, number " + std::to_string(int(kind)));
+}
 
 /// How far a point within `box` may be from its middle in lattice coordinates, rounding included: lattice
 /// coordinates far from the origin are coarse.
@@ -195,27 +221,8 @@ void requireSpectrum(const SpectrumOptions& o) {
               shown(o.highest) + ", fits the tile of " + shown(o.tile));
 }
 
-detail::LatticeKind latticeKind(NoiseKind kind) {
-  switch (kind) {
-    case NoiseKind::simplex:
-      return detail::LatticeKind::simplex;
-    case NoiseKind::worley:
-      return detail::LatticeKind::worley;
-    case NoiseKind::worleyDifference:
-      return detail::LatticeKind::worleyDifference;
-    case NoiseKind::value:
-      return detail::LatticeKind::value;
-    case NoiseKind::gabor:
-      return detail::LatticeKind::gabor;
-    case NoiseKind::perlin:
-    case NoiseKind::spectral:
-      break;
-  }
-  return detail::LatticeKind::perlin;
-}
-
 Made make(const NoiseOptions& o) {
-  noiseName(o.kind);
+  const LatticeKind latticeKind = rowOf(o.kind).lattice;
   const float time = o.time.value_or(0.0f), period = o.period.value_or(0.0f);
   require(std::isfinite(time), "noise: time must be finite, got " + std::to_string(time));
   require(!o.period || (period > 0 && std::isfinite(period)),
@@ -232,7 +239,7 @@ Made make(const NoiseOptions& o) {
     const float steepest = tile.steepest * stretch, gradientRms = tile.gradientRms * o.frequency;
     return {std::make_shared<SpectralNode>(std::move(tile), lattice, o.frequency), steepest, gradientRms};
   }
-  detail::LatticeNoise noise{.kind = latticeKind(o.kind), .lattice = lattice, .moves = o.time.has_value()};
+  detail::LatticeNoise noise{.kind = latticeKind, .lattice = lattice, .moves = o.time.has_value()};
   if (noise.moves) noise.clock = detail::noiseClock(time, period);
   const detail::LatticeFacts facts = detail::latticeFacts(noise.kind, noise.moves);
   Made made{nullptr, facts.steepest * stretch, facts.gradientRms * o.frequency};
@@ -258,34 +265,18 @@ std::span<const NoiseKind> noiseKinds() {
 }
 
 std::string_view noiseName(NoiseKind kind) {
-  switch (kind) {
-    case NoiseKind::perlin:
-      return "perlin";
-    case NoiseKind::simplex:
-      return "simplex";
-    case NoiseKind::worley:
-      return "worley";
-    case NoiseKind::worleyDifference:
-      return "worley_difference";
-    case NoiseKind::value:
-      return "value";
-    case NoiseKind::gabor:
-      return "gabor";
-    case NoiseKind::spectral:
-      return "fft";
-  }
-  throw Error("noise: unknown kind, number " + std::to_string(int(kind)));
+  return rowOf(kind).name;
 }
 
 std::string noiseNames() {
   std::string names;
-  for (const NoiseKind kind : kKinds) names += (names.empty() ? "" : ", ") + std::string(noiseName(kind));
+  for (const KindRow& row : kKindRows) names += (names.empty() ? "" : ", ") + std::string(row.name);
   return names;
 }
 
 NoiseKind noiseKindOf(std::string_view name) {
-  for (const NoiseKind kind : kKinds)
-    if (noiseName(kind) == name) return kind;
+  for (const KindRow& row : kKindRows)
+    if (row.name == name) return row.kind;
   throw Error("noise: unknown kind '" + std::string(name) + "', must be one of " + noiseNames());
 }
 

@@ -21,11 +21,10 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
-#include "nephele/modeling/field/detail/field_lanes.h"
+#include "nephele/modeling/base/float_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 // Not Ne(a, a), which is false for NaN on some instruction sets.
 HWY_INLINE auto isNaN(V a) {
   return hn::Not(hn::Eq(a, a));
@@ -295,8 +294,7 @@ void binaryGradLanes(Binary op, Parameters p, const float* a, const float* b, fl
   withBinary(op, p, [=](const auto& o) HWY_ATTR { binaryGradLoop(o, a, b, out, ga, gb, count); });
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -46,6 +46,14 @@ struct Parameters {
 float scalarValue(Unary op, Parameters parameters, float a);
 float scalarValue(Binary op, Parameters parameters, float a, float b);
 
+/// a op b of numbers or intervals, for the four operations of arithmetic.
+template <class Number>
+Number arithmetic(Binary op, const Number& a, const Number& b) {
+  if (op == Binary::add) return a + b;
+  if (op == Binary::subtract) return a - b;
+  return op == Binary::multiply ? a * b : a / b;
+}
+
 /// out = op(a).
 void apply(Unary op, Parameters parameters, const float* a, float* out, int count);
 /// out = op(a), and the chain rule in place: g[k] = op'(a) g[k].

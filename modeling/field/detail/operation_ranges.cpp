@@ -67,6 +67,8 @@ Interval powerRange(const Interval& a, const Interval& b) {
 Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
   const auto value = [&](float x) { return scalarValue(op, p, x); };
   switch (op) {
+    case Unary::negate:
+      return -a;
     case Unary::mask:
     case Unary::clamp:
       return {value(a.min), value(a.max)};
@@ -82,8 +84,6 @@ Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
   }
   if (a == Interval::everything()) return a;
   switch (op) {
-    case Unary::negate:
-      return -a;
     case Unary::absolute:
       return nephele::abs(a);
     case Unary::square:
@@ -117,14 +117,6 @@ Interval rangeOf(Unary op, const Parameters& p, const Interval& a) {
 
 Interval rangeOf(Binary op, const Parameters& p, const Interval& a, const Interval& b) {
   switch (op) {
-    case Binary::add:
-      return a + b;
-    case Binary::subtract:
-      return a - b;
-    case Binary::multiply:
-      return a * b;
-    case Binary::divide:
-      return a / b;
     case Binary::minimum:
       return nephele::min(a, b);
     case Binary::maximum:
@@ -144,8 +136,9 @@ Interval rangeOf(Binary op, const Parameters& p, const Interval& a, const Interv
       if (std::isfinite(r.max)) r.max = scalarValue(op, p, a.max, b.max) + 1e-6f * std::abs(r.max) + slack;
       return r;
     }
+    default:
+      return arithmetic(op, a, b);
   }
-  return Interval::everything();
 }
 
 }  // namespace nephele::detail

@@ -52,14 +52,6 @@ float scalarValue(Unary op, Parameters parameters, float a) {
 
 float scalarValue(Binary op, Parameters parameters, float a, float b) {
   switch (op) {
-    case Binary::add:
-      return a + b;
-    case Binary::subtract:
-      return a - b;
-    case Binary::multiply:
-      return a * b;
-    case Binary::divide:
-      return a / b;
     case Binary::minimum:
       return a < b || b != b ? a : b;
     case Binary::maximum:
@@ -73,8 +65,9 @@ float scalarValue(Binary op, Parameters parameters, float a, float b) {
       const float inside = overlap > 0 ? overlap : 0;
       return scalarValue(Binary::maximum, {}, a, b) + inside * inside * (0.25f / parameters.p);
     }
+    default:
+      return arithmetic(op, a, b);
   }
-  return std::nanf("");
 }
 
 }  // namespace nephele::detail

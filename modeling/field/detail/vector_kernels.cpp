@@ -10,11 +10,10 @@
 // After foreach_target.h, as it decides what they define.
 #include <hwy/highway.h>
 
-#include "nephele/modeling/field/detail/field_lanes.h"
+#include "nephele/modeling/base/float_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 void productLanes(const float* a, const float* b, float sign, bool accumulate, float* out, int count) {
   const D d;
@@ -55,8 +54,7 @@ void affine3Lanes(const float m[9], const float t[3], const float* const v[3], f
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -27,8 +27,7 @@ inline constexpr float kFarthest = 1e9f;
 
 /// What all noises of a lattice share: cells, and random numbers of their corners.
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 template <class F>
 struct Vector {
@@ -112,7 +111,7 @@ HWY_INLINE float sqrtOf(float a) {
 }
 /// a < limit, both read as signed numbers.
 HWY_INLINE LaneMask signedBelow(WholeLanes a, std::int32_t limit) {
-  return {hn::RebindMask(LanesTag(), hn::Lt(hn::BitCast(SignedTag(), a.v), hn::Set(SignedTag(), limit)))};
+  return {hn::RebindMask(D(), hn::Lt(hn::BitCast(SignedTag(), a.v), hn::Set(SignedTag(), limit)))};
 }
 HWY_INLINE bool signedBelow(std::uint32_t a, std::int32_t limit) {
   return std::int32_t(a) < limit;
@@ -122,17 +121,16 @@ HWY_INLINE Lanes lookUp(const float* table, WholeLanes index) {
   const auto at = hn::BitCast(SignedTag(), index.v);
   // A table of as many numbers as lanes is a permutation, much cheaper than reading memory by lanes.
   if constexpr ((HWY_TARGET & (HWY_AVX3 | HWY_AVX3_DL)) != 0) {
-    const LanesTag d;
+    const D d;
     return Lanes(hn::TableLookupLanes(hn::Load(d, table), hn::IndicesFromVec(d, at)));
   } else {
-    return Lanes(hn::GatherIndex(LanesTag(), table, at));
+    return Lanes(hn::GatherIndex(D(), table, at));
   }
 }
 HWY_INLINE float lookUp(const float* table, std::uint32_t index) {
   return table[index];
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

@@ -24,27 +24,19 @@
 #ifndef NEPHELE_NOISE_CONSTANTS
 #define NEPHELE_NOISE_CONSTANTS
 namespace nephele::detail {
-namespace {
 
 constexpr float kInverseRms = 1 / kPerlinRms;
 
-}  // namespace
 }  // namespace nephele::detail
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
-using D = LanesTag;
-using V = hn::Vec<D>;
+namespace nephele::detail::HWY_NAMESPACE {
 using DI = hn::RebindToSigned<D>;
 using VI = hn::Vec<DI>;
 using DU = hn::RebindToUnsigned<D>;
 using VU = hn::Vec<DU>;
 
-HWY_INLINE V constant(float v) {
-  return hn::Set(D(), v);
-}
 HWY_INLINE VU constantU(std::uint32_t v) {
   return hn::Set(DU(), v);
 }
@@ -141,14 +133,26 @@ HWY_INLINE V latticeCoordinate(const PerlinLattice& lattice, int r, V x, V y, V 
   return hn::Add(hn::Add(xy, hn::Mul(constant(m[2]), z)), constant(lattice.offset[r]));
 }
 
+/// The cells that lanes of points are in.
+template <bool kWithSlope>
+struct Cells {
+  Axis x, y, z;
+  Rows rows;
+
+  HWY_INLINE Cells(const PerlinLattice& lattice, const float* const points[3], int i) {
+    const D d;
+    const V px = hn::Load(d, points[0] + i), py = hn::Load(d, points[1] + i), pz = hn::Load(d, points[2] + i);
+    x = axis<kWithSlope>(latticeCoordinate(lattice, 0, px, py, pz));
+    y = axis<kWithSlope>(latticeCoordinate(lattice, 1, px, py, pz));
+    z = axis<kWithSlope>(latticeCoordinate(lattice, 2, px, py, pz));
+    rows = hashRows(x, y, z, lattice.seed);
+  }
+};
+
 void perlinKernel(const PerlinLattice& lattice, const float* const points[3], float* values, int count) {
   const D d;
   for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V px = hn::Load(d, points[0] + i), py = hn::Load(d, points[1] + i), pz = hn::Load(d, points[2] + i);
-    const Axis x = axis<false>(latticeCoordinate(lattice, 0, px, py, pz));
-    const Axis y = axis<false>(latticeCoordinate(lattice, 1, px, py, pz));
-    const Axis z = axis<false>(latticeCoordinate(lattice, 2, px, py, pz));
-    const Rows r = hashRows(x, y, z, lattice.seed);
+    const auto [x, y, z, r] = Cells<false>(lattice, points, i);
     const V v000 = cornerValue(corner(r.row[0][0], r.x[0]), x.near, y.near, z.near);
     const V v100 = cornerValue(corner(r.row[0][0], r.x[1]), x.far, y.near, z.near);
     const V v010 = cornerValue(corner(r.row[0][1], r.x[0]), x.near, y.far, z.near);
@@ -168,11 +172,7 @@ void perlinGradKernel(const PerlinLattice& lattice, const float* const points[3]
   const D d;
   const V zero = hn::Zero(d), one = constant(1);
   for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-    const V px = hn::Load(d, points[0] + i), py = hn::Load(d, points[1] + i), pz = hn::Load(d, points[2] + i);
-    const Axis x = axis<true>(latticeCoordinate(lattice, 0, px, py, pz));
-    const Axis y = axis<true>(latticeCoordinate(lattice, 1, px, py, pz));
-    const Axis z = axis<true>(latticeCoordinate(lattice, 2, px, py, pz));
-    const Rows r = hashRows(x, y, z, lattice.seed);
+    const auto [x, y, z, r] = Cells<true>(lattice, points, i);
     // Per z layer: the value, its change along x and y, and the blended gradients.
     V value[2], alongX[2], alongY[2], gx[2], gy[2], gz[2];
     for (int k = 0; k < 2; ++k) {
@@ -210,8 +210,7 @@ void perlinGradKernel(const PerlinLattice& lattice, const float* const points[3]
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

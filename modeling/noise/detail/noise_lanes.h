@@ -6,36 +6,32 @@
 #define NEPHELE_NOISE_LANES
 #endif
 
-#include <hwy/highway.h>
-
 #include <cmath>
 #include <cstdint>
+
+#include "nephele/modeling/base/float_lanes.h"
 
 /// The numbers that noise is written in: lanes of floats and of whole numbers with the operators of plain
 /// ones. A noise is one template of them: with float and std::uint32_t it is the scalar truth, with Lanes and
 /// WholeLanes the kernel. Both do the same exactly rounded operations in the same order, never fused, and
 /// agree bit for bit.
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace nephele::detail::HWY_NAMESPACE {
 
-// At most 16 floats, so that a multiple of 16 needs no tail.
-using LanesTag = hn::CappedTag<float, 16>;
-using WholeTag = hn::RebindToUnsigned<LanesTag>;
-using SignedTag = hn::RebindToSigned<LanesTag>;
+using WholeTag = hn::RebindToUnsigned<D>;
+using SignedTag = hn::RebindToSigned<D>;
 
 /// Which lanes a condition holds in.
 struct LaneMask {
-  hn::Mask<LanesTag> m;
+  hn::Mask<D> m;
 };
 
 struct Lanes {
-  hn::Vec<LanesTag> v;
+  V v;
 
   HWY_INLINE Lanes() = default;
-  HWY_INLINE Lanes(float a) : v(hn::Set(LanesTag(), a)) {}
-  HWY_INLINE explicit Lanes(hn::Vec<LanesTag> a) : v(a) {}
+  HWY_INLINE Lanes(float a) : v(hn::Set(D(), a)) {}
+  HWY_INLINE explicit Lanes(V a) : v(a) {}
   friend HWY_INLINE Lanes operator+(Lanes a, Lanes b) { return Lanes(hn::Add(a.v, b.v)); }
   friend HWY_INLINE Lanes operator-(Lanes a, Lanes b) { return Lanes(hn::Sub(a.v, b.v)); }
   friend HWY_INLINE Lanes operator*(Lanes a, Lanes b) { return Lanes(hn::Mul(a.v, b.v)); }
@@ -92,7 +88,7 @@ HWY_INLINE bool both(bool a, bool b) {
   return a && b;
 }
 HWY_INLINE bool none(LaneMask m) {
-  return hn::AllFalse(LanesTag(), m.m);
+  return hn::AllFalse(D(), m.m);
 }
 HWY_INLINE bool none(bool m) {
   return !m;
@@ -114,7 +110,7 @@ HWY_INLINE F maxOf(F a, F b) {
 }
 /// A whole number below 2^31 as a float, and back, rounding down.
 HWY_INLINE Lanes toFloat(WholeLanes a) {
-  return Lanes(hn::ConvertTo(LanesTag(), hn::BitCast(SignedTag(), a.v)));
+  return Lanes(hn::ConvertTo(D(), hn::BitCast(SignedTag(), a.v)));
 }
 HWY_INLINE float toFloat(std::uint32_t a) {
   return float(std::int32_t(a));
@@ -129,9 +125,8 @@ HWY_INLINE void store(float a, float* to) {
   *to = a;
 }
 HWY_INLINE void store(Lanes a, float* to) {
-  hn::Store(a.v, LanesTag(), to);
+  hn::Store(a.v, D(), to);
 }
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

@@ -14,15 +14,14 @@
 /// `template <class F, bool kMoves, bool kGrad> static NoiseSample<F> at(const LatticeNoise&, const
 /// Vector<F>&)`.
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 template <class F>
 HWY_INLINE F load(const float* from) {
   if constexpr (std::is_same_v<F, float>)
     return *from;
   else
-    return F(hn::Load(LanesTag(), from));
+    return F(hn::Load(D(), from));
 }
 /// Numbers per F.
 template <class F>
@@ -30,7 +29,7 @@ HWY_INLINE int laneCount() {
   if constexpr (std::is_same_v<F, float>)
     return 1;
   else
-    return int(hn::Lanes(LanesTag()));
+    return int(hn::Lanes(D()));
 }
 
 /// Lattice coordinate of row `r` of the map.
@@ -92,7 +91,6 @@ float evaluateOne(const Evaluate& evaluate, const LatticeNoise& noise, const Vec
   return value;
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

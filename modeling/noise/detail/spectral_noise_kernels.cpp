@@ -16,8 +16,7 @@
 #include "nephele/modeling/noise/detail/noise_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 /// Weights of the 4 nodes around a point, or of their slopes, per axis.
 template <class F>
@@ -86,7 +85,7 @@ template <bool kGrad>
 void splineKernel(const SpectralTile& tile, const PerlinLattice& lattice, const float* const points[3],
                   float* values, float* const* grads, int count) {
   constexpr int kMost = 16;
-  const LanesTag d;
+  const D d;
   const int lanes = int(hn::Lanes(d));
   const int n = tile.resolution, stride = tile.rowLength(), mask = n - 1;
   const float* const data = tile.coefficients.data();
@@ -168,8 +167,7 @@ void spectralKernel(const SpectralTile& tile, const PerlinLattice& lattice, cons
     splineKernel<false>(tile, lattice, points, values, grads, count);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -9,8 +9,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace nephele::detail {
-namespace HWY_NAMESPACE {
+namespace nephele::detail::HWY_NAMESPACE {
 
 template <class Shape>
 void valueLoop(const Shape shape, const float* __restrict x, const float* __restrict y,
@@ -39,8 +38,7 @@ void gradLanes(const ShapeKind& kind, const PointBlock& p, float* values, const 
              kind);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace nephele::detail
+}  // namespace nephele::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

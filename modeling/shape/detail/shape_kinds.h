@@ -31,19 +31,36 @@ HWY_INLINE float inverseOrZero(float v) {
   return v > 0 ? 1 / v : 0.0f;
 }
 
+/// `radius` less the length of (x, y, z), the way from what is rounded to the point.
+template <bool kGrad>
+HWY_INLINE float rounded(float radius, float x, float y, float z, float& gx, float& gy, float& gz) {
+  const float d = root(x, y, z);
+  if constexpr (kGrad) {
+    const float s = -inverseOrZero(d);
+    gx = s * x, gy = s * y, gz = s * z;
+  }
+  return radius - d;
+}
+
+/// (x, y, z) along an axis and away from it.
+struct AxisWay {
+  float h, rx, ry, rz, r;
+
+  HWY_INLINE AxisWay(const Vec3f& axis, float x, float y, float z)
+      : h(x * axis.x + y * axis.y + z * axis.z),
+        rx(x - h * axis.x),
+        ry(y - h * axis.y),
+        rz(z - h * axis.z),
+        r(root(rx, ry, rz)) {}
+};
+
 struct SphereShape {
   Vec3f center;
   float radius;
 
   template <bool kGrad>
   HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
-    const float x = px - center.x, y = py - center.y, z = pz - center.z;
-    const float d = root(x, y, z);
-    if constexpr (kGrad) {
-      const float s = -inverseOrZero(d);
-      gx = s * x, gy = s * y, gz = s * z;
-    }
-    return radius - d;
+    return rounded<kGrad>(radius, px - center.x, py - center.y, pz - center.z, gx, gy, gz);
   }
 };
 
@@ -89,10 +106,7 @@ struct TorusShape {
 
   template <bool kGrad>
   HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
-    const float x = px - center.x, y = py - center.y, z = pz - center.z;
-    const float h = x * axis.x + y * axis.y + z * axis.z;
-    const float rx = x - h * axis.x, ry = y - h * axis.y, rz = z - h * axis.z;
-    const float r = root(rx, ry, rz);
+    const auto [h, rx, ry, rz, r] = AxisWay(axis, px - center.x, py - center.y, pz - center.z);
     const float e = r - major;
     const float d = std::sqrt(e * e + h * h);
     if constexpr (kGrad) {
@@ -114,13 +128,7 @@ struct CapsuleShape {
   HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
     const float x = px - a.x, y = py - a.y, z = pz - a.z;
     const float t = smaller(larger((x * way.x + y * way.y + z * way.z) * inverseSquare, 0), 1);
-    const float wx = x - t * way.x, wy = y - t * way.y, wz = z - t * way.z;
-    const float d = root(wx, wy, wz);
-    if constexpr (kGrad) {
-      const float s = -inverseOrZero(d);
-      gx = s * wx, gy = s * wy, gz = s * wz;
-    }
-    return radius - d;
+    return rounded<kGrad>(radius, x - t * way.x, y - t * way.y, z - t * way.z, gx, gy, gz);
   }
 };
 
@@ -132,10 +140,7 @@ struct ConeShape {
 
   template <bool kGrad>
   HWY_INLINE float at(float px, float py, float pz, float& gx, float& gy, float& gz) const {
-    const float x = px - base.x, y = py - base.y, z = pz - base.z;
-    const float h = x * axis.x + y * axis.y + z * axis.z;
-    const float rx = x - h * axis.x, ry = y - h * axis.y, rz = z - h * axis.z;
-    const float r = root(rx, ry, rz);
+    const auto [h, rx, ry, rz, r] = AxisWay(axis, px - base.x, py - base.y, pz - base.z);
     // Nearest points of the base and of the slant, as the way from there to (r, h).
     const float br = larger(r - radius, 0), bh = h;
     const float t = smaller(larger((h * height - (r - radius) * radius) * inverseSquare, 0), 1);

@@ -47,21 +47,21 @@ HWY_INLINE Ints wholeOf(Floats x) {
 }
 
 // Of vectors that hold pairs side by side, all the first halves or all the second.
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE Floats firstOf(Floats low, Floats) {
+  return low;
+}
+HWY_INLINE Floats secondOf(Floats, Floats high) {
+  return high;
+}
+#else
 HWY_INLINE Floats firstOf(Floats low, Floats high) {
-#if HWY_TARGET == HWY_SCALAR
-  return static_cast<void>(high), low;
-#else
   return hn::ConcatEven(Lanes(), high, low);
-#endif
 }
-
 HWY_INLINE Floats secondOf(Floats low, Floats high) {
-#if HWY_TARGET == HWY_SCALAR
-  return static_cast<void>(low), high;
-#else
   return hn::ConcatOdd(Lanes(), high, low);
-#endif
 }
+#endif
 
 // Lane n of the result is lane `from[n]` of x.
 struct LaneOrder {
