@@ -66,7 +66,6 @@ constexpr std::size_t kSearchedBricks = 512;
 constexpr std::size_t kSearchedShare = 4;
 /// Of a layer's time, the rest being spent on the sum for the next one.
 constexpr double kShareOfBake = 0.85;
-constexpr int kBrickSamples = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
 
 /// Width kept on either side of the band of a layer. Displacement ends at three quarters of it.
 float marginOf(const std::vector<CumuloLayer>& layers, std::size_t index, const CumuloGridOptions& options) {

@@ -45,7 +45,7 @@ class Neighbours {
   explicit Neighbours(const BrickSamples& samples) : neighbours_(samples.pool.size()) {
     for (const PlacedBrick& brick : samples.placed)
       for (std::size_t n = 0; n < 6; ++n)
-        neighbours_[std::size_t(brick.pool)][n] = samples.poolIndex(brick.brick + kSteps[n]);
+        neighbours_[std::size_t(brick.pool)][n] = samples.table.at(brick.brick + kSteps[n]);
   }
 
   std::size_t brickCount() const { return neighbours_.size(); }
@@ -195,7 +195,7 @@ std::vector<bool> bricksThatSee(const BrickSamples& samples, const Mask& mask) {
       unsigned seen = 0;
       for (int z = shared(2)[0]; z < shared(2)[1]; ++z)
         for (int y = shared(1)[0]; y < shared(1)[1]; ++y) seen |= mask.row(b, z * kBrick + y) & bits;
-      if (seen != 0) result[std::size_t(samples.poolIndex(brick.brick + direction))] = true;
+      if (seen != 0) result[std::size_t(samples.table.at(brick.brick + direction))] = true;
     }
   }
   result[0] = false;

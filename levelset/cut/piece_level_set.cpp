@@ -50,7 +50,7 @@ class PieceLevelSetNode final : public FieldNode<float> {
     const Vec3i voxel{int(low.x), int(low.y), int(low.z)};
     std::array<float, 8> corners;
     const Vec3i inside{insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)};
-    const std::int32_t entry = level_.table_->entryAt(brickOf(voxel));
+    const std::int32_t entry = level_.table_->at(brickOf(voxel));
     if (entry == PieceLevelSet::kOutside) return -level_.band();
     if (entry == PieceLevelSet::kInside) return level_.band();
     if (std::max({inside.x, inside.y, inside.z}) < kBrick - 1) {
@@ -74,7 +74,7 @@ class PieceLevelSetNode final : public FieldNode<float> {
 /// The range of the samples around the box if it meets few bricks; of larger ones whether they hold samples.
 Interval PieceLevelSetNode::range(const Box& box, RangeMemo&) const {
   const float band = level_.band();
-  const BrickBox& bricks = level_.table_->bricks;
+  const BrickBox& bricks = level_.table_->box;
   // One brick around the table, for what is beyond it.
   const Vec3i least = (bricks.first - Vec3i{1, 1, 1}) * kBrick;
   const Vec3i most = (bricks.first + bricks.count + Vec3i{1, 1, 1}) * kBrick - Vec3i{1, 1, 1};
@@ -95,7 +95,7 @@ Interval PieceLevelSetNode::range(const Box& box, RangeMemo&) const {
   const auto include = [&](float v) { range = {std::min(range.min, v), std::max(range.max, v)}; };
   for (std::size_t i = 0; i < around.size() && !(range.min == -band && range.max == band); ++i) {
     const Vec3i brick = around.at(i);
-    const std::int32_t entry = level_.table_->entryAt(brick);
+    const std::int32_t entry = level_.table_->at(brick);
     if (entry != PieceLevelSet::kInside) include(-band);
     if (entry != PieceLevelSet::kOutside) include(band);
   }
@@ -104,7 +104,7 @@ Interval PieceLevelSetNode::range(const Box& box, RangeMemo&) const {
   for (std::size_t i = 0; i < around.size(); ++i) {
     const Vec3i brick = around.at(i), first = max(low - brick * kBrick, Vec3i{}),
                 last = min(high - brick * kBrick, Vec3i{kBrick - 1, kBrick - 1, kBrick - 1});
-    const std::int32_t entry = level_.table_->entryAt(brick);
+    const std::int32_t entry = level_.table_->at(brick);
     if (entry <= PieceLevelSet::kInside) {
       include(entry == PieceLevelSet::kInside ? band : -band);
       continue;
@@ -121,11 +121,11 @@ Interval PieceLevelSetNode::range(const Box& box, RangeMemo&) const {
 
 }  // namespace detail
 
-PieceLevelSet::PieceLevelSet(float voxelSize, float band, Table table,
+PieceLevelSet::PieceLevelSet(float voxelSize, float band, FlatBrickTable table,
                              std::shared_ptr<const detail::LargeArray> bricks)
     : voxelSize_(voxelSize),
       band_(band),
-      table_(std::make_shared<const Table>(std::move(table))),
+      table_(std::make_shared<const FlatBrickTable>(std::move(table))),
       bricks_(std::move(bricks)) {}
 
 std::size_t PieceLevelSet::storedBricks() const {
@@ -134,8 +134,7 @@ std::size_t PieceLevelSet::storedBricks() const {
 }
 
 std::size_t PieceLevelSet::memoryBytes() const {
-  return sizeof(Table) + table_->entries.size() * sizeof(std::int32_t) +
-         storedBricks() * kSamples * sizeof(float);
+  return sizeof(FlatBrickTable) + table_->memoryBytes() + storedBricks() * kSamples * sizeof(float);
 }
 
 const float* PieceLevelSet::samplesOf(std::int32_t entry) const {
@@ -143,7 +142,7 @@ const float* PieceLevelSet::samplesOf(std::int32_t entry) const {
 }
 
 float PieceLevelSet::at(const Vec3i& voxel) const {
-  const std::int32_t entry = table_->entryAt(brickOf(voxel));
+  const std::int32_t entry = table_->at(brickOf(voxel));
   if (entry == kOutside) return -band_;
   if (entry == kInside) return band_;
   return samplesOf(entry)[offsetIn({insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)})];
@@ -161,7 +160,7 @@ double PieceLevelSet::volume() const {
   ends[kOutside].fill(-band_);
   ends[kInside].fill(band_);
   for (std::size_t end = 0; end < ends.size(); ++end) samples[end] = ends[end].data();
-  Table places = *table_;
+  FlatBrickTable places = *table_;
   for (std::int32_t& entry : places.entries) {
     if (entry <= kInside) continue;
     samples.push_back(samplesOf(entry));
@@ -170,11 +169,11 @@ double PieceLevelSet::volume() const {
   }
   // The cells before the first samples have corners in the table's first bricks.
   const Vec3i one{1, 1, 1};
-  const BrickBox around{places.bricks.first - one, places.bricks.count + one};
+  const BrickBox around{places.box.first - one, places.box.count + one};
   const auto shareOf = [&](const Vec3i& at, detail::BrickCells& cells) {
     std::array<std::size_t, 8> corners;
     for (int i = 0; i < 8; ++i)
-      corners[std::size_t(i)] = std::size_t(places.entryAt(at + Vec3i{i & 1, i >> 1 & 1, i >> 2}));
+      corners[std::size_t(i)] = std::size_t(places.at(at + Vec3i{i & 1, i >> 1 & 1, i >> 2}));
     if (corners[0] <= kInside &&
         std::all_of(corners.begin(), corners.end(), [&](std::size_t corner) { return corner == corners[0]; }))
       return 0.0;
@@ -201,7 +200,7 @@ double PieceLevelSet::volume() const {
 }
 
 std::shared_ptr<BrickGrid> PieceLevelSet::toBricks() const {
-  auto grid = std::make_shared<BrickGrid>(Lattice::uniform(voxelSize_), table_->bricks, -band_);
+  auto grid = std::make_shared<BrickGrid>(Lattice::uniform(voxelSize_), table_->box, -band_);
   grid->reserve(2 + storedBricks());
   grid->appendConstant(band_);
   std::int32_t next = grid->append(storedBricks());

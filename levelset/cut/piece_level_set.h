@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/field/field.h"
 
@@ -24,26 +23,17 @@ class PieceLevelSet {
  public:
   /// Table entries for bricks without samples.
   static constexpr std::int32_t kOutside = 0, kInside = 1;
-  static constexpr std::size_t kSamples = 512;
+  static constexpr std::size_t kSamples = kBrickSamples;
 
-  /// The bricks in a table of brick positions, x fastest; entry n > 1 is brick n - 2 of `bricks`.
-  struct Table {
-    BrickBox bricks;
-    std::vector<std::int32_t> entries;
-
-    /// kOutside beyond the table.
-    std::int32_t entryAt(const Vec3i& brick) const {
-      return bricks.covers(brick) ? entries[bricks.numberOf(brick)] : kOutside;
-    }
-  };
-
-  PieceLevelSet(float voxelSize, float band, Table table, std::shared_ptr<const detail::LargeArray> bricks);
+  /// Entry n > 1 of the table is brick n - 2 of `bricks`.
+  PieceLevelSet(float voxelSize, float band, FlatBrickTable table,
+                std::shared_ptr<const detail::LargeArray> bricks);
 
   float voxelSize() const { return voxelSize_; }
   /// How far from the surface values go, world units.
   float band() const { return band_; }
-  const Vec3i& firstBrick() const { return table_->bricks.first; }
-  const Vec3i& brickCount() const { return table_->bricks.count; }
+  const Vec3i& firstBrick() const { return table_->box.first; }
+  const Vec3i& brickCount() const { return table_->box.count; }
   /// Bricks that hold samples.
   std::size_t storedBricks() const;
   /// Bytes of its own table and bricks.
@@ -70,7 +60,7 @@ class PieceLevelSet {
   const float* samplesOf(std::int32_t entry) const;
 
   float voxelSize_ = 1.0f, band_ = 0.0f;
-  std::shared_ptr<const Table> table_;
+  std::shared_ptr<const FlatBrickTable> table_;
   std::shared_ptr<const detail::LargeArray> bricks_;
 };
 

@@ -28,9 +28,8 @@ namespace nephele {
 namespace {
 
 using detail::BrickPoints;
-using detail::kOwnSamples;
 using GridHandle = std::shared_ptr<const BrickGrid>;
-using Samples = std::array<float, kOwnSamples>;
+using Samples = std::array<float, kBrickSamples>;
 
 /// Values of the gridded methods nearer to the background than this share of the grid's spread are the
 /// background: blurred rims would spread by a voxel in every step.
@@ -43,7 +42,7 @@ void evaluate(const VectorField& field, const BrickPoints& at, BrickPoints& resu
 }
 
 void evaluate(const ScalarField& field, const BrickPoints& at, float* values) {
-  field.eval({at.x, at.y, at.z}, std::span<float>(values, kOwnSamples));
+  field.eval({at.x, at.y, at.z}, std::span<float>(values, kBrickSamples));
 }
 
 /// Cuts `value` off at the least and the largest of the eight samples around a point.
@@ -76,12 +75,12 @@ struct Source {
 
   void read(const BrickPoints& at, float* values) const {
     evaluate(field, at, values);
-    for (int i = 0; i < kOwnSamples; ++i) values[i] = withinCell(*grid, at[i], values[i]);
+    for (int i = 0; i < kBrickSamples; ++i) values[i] = withinCell(*grid, at[i], values[i]);
   }
 };
 
 bool holdsOther(const float* samples, float background) {
-  return !std::all_of(samples, samples + kOwnSamples, [&](float v) { return v == background; });
+  return !std::all_of(samples, samples + kBrickSamples, [&](float v) { return v == background; });
 }
 
 std::vector<Vec3i> overlapping(const std::vector<Vec3i>& bricks, const Lattice& from, const Lattice& to) {
@@ -124,7 +123,7 @@ GridHandle readThrough(const GridHandle& grid, const std::vector<Vec3i>& seeds, 
     BrickPoints there;
     evaluate(map, points, there);
     source.read(there, samples);
-    for (int i = 0; i < kOwnSamples; ++i)
+    for (int i = 0; i < kBrickSamples; ++i)
       if (!isMapped(points[i])) samples[i] = grid->background();
     return holdsOther(samples, grid->background());
   };
@@ -173,7 +172,7 @@ class GridStep {
       evaluate(source_.field, before, samples);
       evaluate(ahead.field, after, back.data());
       evaluate(source_.field, points, there.data());
-      for (int i = 0; i < kOwnSamples; ++i) {
+      for (int i = 0; i < kBrickSamples; ++i) {
         const float corrected = samples[i] + 0.5f * (there[std::size_t(i)] - back[std::size_t(i)]);
         samples[i] = cleared(withinCell(*source_.grid, before[i], corrected));
       }
@@ -192,7 +191,7 @@ class GridStep {
       evaluate(forward_, points, after);
       evaluate(ahead.field, after, back.data());
       evaluate(source_.field, points, samples);
-      for (int i = 0; i < kOwnSamples; ++i)
+      for (int i = 0; i < kBrickSamples; ++i)
         samples[i] = cleared(samples[i] + 0.5f * (samples[i] - back[std::size_t(i)]));
       return holdsOther(samples, source_.grid->background());
     };
@@ -215,7 +214,7 @@ class GridStep {
       BrickPoints before;
       evaluate(back_, BrickPoints(lattice_, brick), before);
       evaluate(what.field, before, samples);
-      for (int i = 0; i < kOwnSamples; ++i)
+      for (int i = 0; i < kBrickSamples; ++i)
         samples[i] = cleared(withinCell(*limits.grid, before[i], samples[i]));
       return holdsOther(samples, source_.grid->background());
     };

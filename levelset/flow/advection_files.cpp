@@ -122,17 +122,14 @@ FlowMap readFlowMap(const std::string& path) {
   const VoxelGrid<Vec3f> voxels = toVectorVoxels(*file);
   FlowMap map;
   map.lattice = voxels.lattice();
-  detail::GrownBricks grown;
-  grown.components = 3;
-  grown.bricks.resize(voxels.sampledBricks());
-  grown.samples.resize(3 * detail::kOwnSamples * grown.bricks.size());
+  detail::GrownBricks grown(3);
   voxels.forEachBrick([&](const Vec3i& brick, std::int32_t number) {
     if (number < 0) return;
-    grown.bricks[std::size_t(number)] = brick;
-    float* target = grown.samples.data() + 3 * detail::kOwnSamples * std::size_t(number);
+    grown.bricks.push_back(brick);
+    float* target = grown.samples.samples(grown.samples.add(brick));
     const Vec3f* values = voxels.samples(number);
-    for (int i = 0; i < detail::kOwnSamples; ++i)
-      for (int c = 0; c < 3; ++c) target[c * detail::kOwnSamples + i] = values[i][c];
+    for (int i = 0; i < kBrickSamples; ++i)
+      for (int c = 0; c < 3; ++c) target[c * kBrickSamples + i] = values[i][c];
   });
   if (grown.bricks.empty()) return map;
   const float zero[3] = {};

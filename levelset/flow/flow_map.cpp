@@ -31,7 +31,6 @@ namespace {
 
 using detail::BrickPoints;
 using detail::BrickTable;
-using detail::kOwnSamples;
 
 /// How far tricubic interpolation reads, in voxels.
 constexpr int kReach = 2;
@@ -222,17 +221,17 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
     BrickPoints read = source;
     bool isKnown = map.isIdentity();
     if (!isKnown)
-      for (int i = 0; i < kOwnSamples; ++i) {
+      for (int i = 0; i < kBrickSamples; ++i) {
         Vec3f p = source[i];
         isKnown |= kept.nearest(p);
         read.set(i, p);
       }
     displacement.eval({read.x, read.y, read.z}, spansOf(moved));
     bool matters = false;
-    for (int i = 0; i < kOwnSamples; ++i) {
+    for (int i = 0; i < kBrickSamples; ++i) {
       const Vec3f d = (source[i] - points[i]) + moved[i];
       if (!isFinite(d)) failNotFinite(points[i]);
-      for (int c = 0; c < 3; ++c) samples[c * kOwnSamples + i] = d[c];
+      for (int c = 0; c < 3; ++c) samples[c * kBrickSamples + i] = d[c];
       matters = matters || (isKnown && matter.mayBeAt(points[i] + d));
     }
     return matters;
@@ -272,7 +271,7 @@ double foldedShare(const FlowMap& map, const Matter& matter) {
           }
     folded += count;
   });
-  return double(folded) / (double(bricks.size()) * kOwnSamples);
+  return double(folded) / (double(bricks.size()) * kBrickSamples);
 }
 
 }  // namespace nephele

@@ -100,23 +100,20 @@ class Baker {
     const std::int32_t entry = constant(settled.value);
     const Vec3i end = min(settled.brick + Vec3i{settled.size, settled.size, settled.size},
                           walk_.places().first + walk_.places().count);
-    for (int z = settled.brick.z; z < end.z; ++z)
-      for (int y = settled.brick.y; y < end.y; ++y)
-        std::fill_n(table_.begin() + std::ptrdiff_t(walk_.places().numberOf({settled.brick.x, y, z})),
-                    end.x - settled.brick.x, entry);
+    table_.fill(settled.brick, end, entry);
   }
 
   /// The bricks that are no constants, in order; fills the table, for a pool in which they follow the
   /// constants.
   std::vector<Leaf> judged(const std::vector<CellResult>& results) {
-    table_.assign(walk_.places().size(), 0);
+    table_ = FlatBrickTable(walk_.places());
     constant(walk_.background());
     for (const Settled& s : settled_) enter(s);
     std::vector<Leaf> leaves;
     for (const CellResult& result : results) {
       for (const Settled& s : result.settled) enter(s);
       for (const Leaf& leaf : result.leaves) {
-        table_[walk_.places().numberOf(leaf.brick)] = std::int32_t(-1 - std::int64_t(leaves.size()));
+        table_[leaf.brick] = std::int32_t(-1 - std::int64_t(leaves.size()));
         leaves.push_back(leaf);
       }
     }
@@ -125,7 +122,7 @@ class Baker {
     parallelFor(leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         constants[i] = walk_.collapsed(leaves[i], [&](const Vec3i& b) {
-          const std::int32_t entry = table_[walk_.places().numberOf(b)];
+          const std::int32_t entry = table_[b];
           return entry >= 0 ? Standing{&constants_[std::size_t(entry)]}
                             : Standing{nullptr, &leaves[std::size_t(-1 - entry)]};
         });
@@ -133,7 +130,7 @@ class Baker {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       if (constants[i])
-        table_[walk_.places().numberOf(leaves[i].brick)] = constant(*constants[i]);
+        table_[leaves[i].brick] = constant(*constants[i]);
       else
         leaves[kept++] = leaves[i];
     }
@@ -141,7 +138,7 @@ class Baker {
     const std::size_t poolSize = constants_.size() + leaves.size();
     require(double(poolSize) < kMostBricks, "bake: too many bricks; use larger voxels");
     for (std::size_t i = 0; i < leaves.size(); ++i)
-      table_[walk_.places().numberOf(leaves[i].brick)] = std::int32_t(constants_.size() + i);
+      table_[leaves[i].brick] = std::int32_t(constants_.size() + i);
     return leaves;
   }
 
@@ -151,7 +148,7 @@ class Baker {
     for (int c = 0; c < Walk::kLanes; ++c) grids[c] = emptyGrid(c, constants_.size() + leaves.size());
     move(leaves, results, grids);
     for (int c = 0; c < Walk::kLanes; ++c) {
-      grids[c]->setTable(c + 1 < Walk::kLanes ? table_ : std::move(table_));
+      grids[c]->setTable(c + 1 < Walk::kLanes ? table_.entries : std::move(table_.entries));
       fillBorders(*grids[c]);
     }
     return grids;
@@ -162,7 +159,6 @@ class Baker {
     BrickSamples all;
     all.voxelSize = walk_.options().voxelSize;
     all.background = walk_.background()[0];
-    all.places = walk_.places();
     all.table = std::move(table_);
     SampleStore constants(constants_.size() * Walk::kOwn);
     for (std::size_t i = 0; i < constants_.size(); ++i) {
@@ -218,7 +214,7 @@ class Baker {
   Walk walk_;
   const Progress& progress_;
   std::vector<Settled> settled_;
-  std::vector<std::int32_t> table_;
+  FlatBrickTable table_;
   std::vector<Values> constants_;
   std::map<Values, std::int32_t> constantNumbers_;
 };

@@ -9,6 +9,10 @@
 
 namespace nephele {
 
+/// Samples that a brick has of its own along each axis, and in all.
+inline constexpr int kBrickSide = 8;
+inline constexpr int kBrickSamples = kBrickSide * kBrickSide * kBrickSide;
+
 /// A box of bricks, numbered as in the table of a grid: x fastest, then y, then z.
 struct BrickBox {
   Vec3i first{}, count{};
@@ -30,6 +34,20 @@ struct BrickBox {
     return first + Vec3i{int(number % nx), int(number / nx % ny), int(number / nx / ny)};
   }
 };
+
+/// Floored division of a voxel coordinate by the side of a brick, and what is left (0 to 7).
+constexpr int brickOf(int voxel) {
+  return voxel >> 3;
+}
+constexpr int insideBrick(int voxel) {
+  return voxel & 7;
+}
+constexpr Vec3i brickOf(const Vec3i& voxel) {
+  return {brickOf(voxel.x), brickOf(voxel.y), brickOf(voxel.z)};
+}
+constexpr Vec3i insideBrick(const Vec3i& voxel) {
+  return {insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z)};
+}
 
 /// The order of the numbers of a box: z, then y, then x.
 inline bool comesBefore(const Vec3i& a, const Vec3i& b) {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/grid/detail/brick_borders.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -15,7 +15,6 @@ namespace nephele::detail {
 namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
-constexpr int kWidth = BrickGrid::kWidth;
 
 template <class Body>
 void forNeighbours(const Vec3i& brick, const Body& body) {
@@ -25,11 +24,22 @@ void forNeighbours(const Vec3i& brick, const Body& body) {
         if (x != 0 || y != 0 || z != 0) body(brick + Vec3i{x, y, z});
 }
 
-/// Where the samples of a brick come from along one axis, by the neighbour on that side (-1, 0, 1).
-struct AxisPart {
-  int target, source, count;
-};
-constexpr AxisPart kAxisParts[3] = {{0, kBrick - 1, 1}, {1, 0, kBrick}, {1 + kBrick, 0, 2}};
+/// Stores the nearest layer, edge or corner of the brick's own samples in the place of a part that is not
+/// there.
+void repeatNearest(const BorderPart& part, const float* own, float* stored) {
+  BorderPart nearest = part;
+  SampleStrides strides = kOwnStrides;
+  const auto clampAxis = [&](int axis, int& stride) {
+    if (part.side[axis] == 0) return;
+    nearest.source[axis] = 0;
+    if (part.side[axis] > 0) own += (kBrick - 1) * stride;
+    stride = 0;
+  };
+  clampAxis(0, strides.x);
+  clampAxis(1, strides.y);
+  clampAxis(2, strides.z);
+  copyPart(nearest, own, strides, 1.0f, stored);
+}
 
 }  // namespace
 
@@ -43,73 +53,61 @@ BrickPoints::BrickPoints(const Lattice& lattice, const Vec3i& brick) {
 
 GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& options,
                        const EvaluateBrick& evaluate, const Progress& progress) {
-  const std::size_t stride = std::size_t(options.components) * kOwnSamples;
-  GrownBricks grown;
-  grown.components = options.components;
-  std::vector<Vec3i> bricks;
+  GrownBricks grown(options.components);
+  const BrickTable& numbers = grown.samples.table();
+  // Of each number, the brick and whether it matters; the last ones are yet to be evaluated.
+  std::vector<Vec3i> asked;
   std::vector<std::uint8_t> matters;
-  BrickTable asked("advection");
-  std::vector<Vec3i> wave;
   const auto ask = [&](const Vec3i& brick) {
-    if (asked.at(brick) >= 0) return;
-    asked.set(brick, std::int32_t(bricks.size() + wave.size()));
-    wave.push_back(brick);
+    if (numbers.at(brick) >= 0) return;
+    grown.samples.add(brick);
+    asked.push_back(brick);
   };
   for (const Vec3i& seed : seeds) ask(seed);
-  while (!wave.empty()) {
-    const std::size_t start = bricks.size();
-    bricks.insert(bricks.end(), wave.begin(), wave.end());
-    wave.clear();
-    matters.resize(bricks.size());
-    grown.samples.resize(bricks.size() * stride);
+  while (matters.size() < asked.size()) {
+    const std::size_t start = matters.size(), end = asked.size();
+    matters.resize(end);
     parallelFor(
-        bricks.size() - start, 4,
-        [&](std::size_t begin, std::size_t end) {
-          for (std::size_t i = start + begin; i < start + end; ++i)
-            matters[i] = std::uint8_t(evaluate(bricks[i], grown.samples.data() + i * stride));
+        end - start, 4,
+        [&](std::size_t first, std::size_t last) {
+          for (std::size_t i = start + first; i < start + last; ++i)
+            matters[i] = std::uint8_t(evaluate(asked[i], grown.samples.samples(std::int32_t(i))));
         },
         progress);
-    for (std::size_t i = start; i < bricks.size(); ++i)
-      if (matters[i]) forNeighbours(bricks[i], ask);
+    for (std::size_t i = start; i < end; ++i) {
+      const Vec3i brick = asked[i];
+      if (matters[i]) forNeighbours(brick, ask);
+    }
   }
 
-  // What is kept moves to the front, in the order in which it was asked; bricks that matter first.
-  std::vector<std::size_t> kept;
-  for (std::size_t i = 0; i < bricks.size(); ++i)
-    if (matters[i]) kept.push_back(i);
-  grown.relevantCount = kept.size();
-  if (options.withNeighbours)
-    for (std::size_t i = 0; i < bricks.size(); ++i) {
-      bool isBeside = false;
-      if (!matters[i])
-        forNeighbours(bricks[i], [&](const Vec3i& b) {
-          const std::int32_t other = asked.at(b);
-          isBeside |= other >= 0 && matters[std::size_t(other)] != 0;
-        });
-      if (isBeside) kept.push_back(i);
-    }
-  std::vector<float> samples(kept.size() * stride);
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    grown.bricks.push_back(bricks[kept[i]]);
-    std::copy_n(grown.samples.data() + kept[i] * stride, stride, samples.data() + i * stride);
+  const auto isBeside = [&](const Vec3i& brick) {
+    bool is = false;
+    forNeighbours(brick, [&](const Vec3i& b) {
+      const std::int32_t other = numbers.at(b);
+      is |= other >= 0 && matters[std::size_t(other)] != 0;
+    });
+    return is;
+  };
+  std::vector<Vec3i> beside, others;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const bool isKept = options.withNeighbours && !matters[i] && isBeside(asked[i]);
+    (matters[i] ? grown.bricks : isKept ? beside : others).push_back(asked[i]);
   }
-  grown.samples = std::move(samples);
+  grown.bricks.insert(grown.bricks.end(), beside.begin(), beside.end());
+  for (const Vec3i& brick : others) grown.samples.table().set(brick, BrickTable::kNone);
   return grown;
 }
 
 std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, const Lattice& lattice,
                                                       std::span<const float> backgrounds, Beyond beyond) {
-  const std::size_t stride = std::size_t(grown.components) * kOwnSamples;
   std::vector<std::shared_ptr<BrickGrid>> grids;
   // With a background outside, bricks beside the grown ones blend towards it.
   std::vector<Vec3i> placed = grown.bricks;
-  BrickTable numbers("advection");
-  for (std::size_t i = 0; i < grown.bricks.size(); ++i) numbers.set(grown.bricks[i], std::int32_t(i));
   if (beyond == Beyond::background) {
     BrickTable beside("advection");
     for (const Vec3i& brick : grown.bricks)
       forNeighbours(brick, [&](const Vec3i& b) {
-        if (numbers.at(b) >= 0 || beside.at(b) >= 0) return;
+        if (grown.samples.find(b) || beside.at(b) >= 0) return;
         beside.set(b, 0);
         placed.push_back(b);
       });
@@ -123,33 +121,21 @@ std::vector<std::shared_ptr<BrickGrid>> assembleGrids(const GrownBricks& grown, 
   for (int c = 0; c < grown.components; ++c) {
     auto grid = std::make_shared<BrickGrid>(lattice, BrickBox{first, last - first + Vec3i{1, 1, 1}},
                                             backgrounds[std::size_t(c)]);
+    const auto samplesOf = [&](const Vec3i& brick) -> const float* {
+      const float* samples = grown.samples.find(brick);
+      return samples ? samples + c * kBrickSamples : nullptr;
+    };
     const auto fill = [&](const Vec3i& brick, float* target) {
-      const std::int32_t own = numbers.at(brick);
-      bool isBackground = true;
-      for (int k = 0; k < 27; ++k) {
-        const Vec3i side{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
-        const AxisPart px = kAxisParts[side.x + 1], py = kAxisParts[side.y + 1], pz = kAxisParts[side.z + 1];
-        const std::int32_t other = numbers.at(brick + side);
-        const std::int32_t source = other >= 0 || beyond == Beyond::background ? other : own;
-        const float* from =
-            source >= 0 ? grown.samples.data() + std::size_t(source) * stride + std::size_t(c) * kOwnSamples
-                        : nullptr;
-        // A border that is not there repeats the nearest layer of the brick itself.
-        const auto place = [&](const AxisPart& part, int direction, int i) {
-          return other >= 0 || direction == 0 ? part.source + i : direction < 0 ? 0 : kBrick - 1;
-        };
-        for (int z = 0; z < pz.count; ++z)
-          for (int y = 0; y < py.count; ++y)
-            for (int x = 0; x < px.count; ++x) {
-              const float value = from
-                                      ? from[(place(pz, side.z, z) * kBrick + place(py, side.y, y)) * kBrick +
-                                             place(px, side.x, x)]
-                                      : grid->background();
-              target[((z + pz.target) * kWidth + y + py.target) * kWidth + x + px.target] = value;
-              isBackground &= value == grid->background();
-            }
+      for (const BorderPart& part : kBorderParts) {
+        if (const float* there = samplesOf(brick + part.side))
+          copyPart(part, there, kOwnStrides, 1.0f, target);
+        else if (beyond == Beyond::background)
+          fillPart(part, grid->background(), target);
+        else
+          repeatNearest(part, samplesOf(brick), target);
       }
-      return !isBackground;
+      return !std::all_of(target, target + BrickGrid::kVolume,
+                          [&](float value) { return value == grid->background(); });
     };
     // Only bricks that hold something get a place; found first, so that no sample is ever moved.
     std::vector<std::int32_t> place(placed.size());

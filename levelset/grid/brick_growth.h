@@ -7,19 +7,16 @@
 #include <vector>
 
 #include "nephele/levelset/grid/brick_grid.h"
-#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/lattice.h"
+#include "nephele/levelset/grid/sparse_bricks.h"
 #include "nephele/modeling/base/progress.h"
 
 /// Sparse grids whose extent is found while they are computed. For the implementation of advection.
 namespace nephele::detail {
 
-/// Samples that a brick has of its own.
-inline constexpr int kOwnSamples = kBrickSamples;
-
 /// World positions of the own samples of `brick`, x fastest.
 struct BrickPoints {
-  std::array<float, kOwnSamples> x, y, z;
+  std::array<float, kBrickSamples> x, y, z;
   BrickPoints() = default;
   BrickPoints(const Lattice& lattice, const Vec3i& brick);
   Vec3f operator[](int i) const { return {x[std::size_t(i)], y[std::size_t(i)], z[std::size_t(i)]}; }
@@ -28,13 +25,16 @@ struct BrickPoints {
   }
 };
 
-/// Bricks and `components` times kOwnSamples samples of each, one component after the other.
+/// Bricks and `components` times kBrickSamples samples of each, one component after the other.
 struct GrownBricks {
-  int components = 1;
+  explicit GrownBricks(int componentCount)
+      : components(componentCount), samples("advection", std::size_t(componentCount) * kBrickSamples) {}
+
+  int components;
+  /// Those of `bricks`.
+  SparseBricks<float> samples;
+  /// First those that were found to matter, then those that stand beside them.
   std::vector<Vec3i> bricks;
-  std::vector<float> samples;
-  /// Bricks that were found to matter; the others stand beside them.
-  std::size_t relevantCount = 0;
 };
 
 struct GrowthOptions {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/grid/detail/brick_borders.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 
@@ -17,7 +17,6 @@ namespace nephele::detail {
 
 namespace {
 
-constexpr int kBrick = BrickGrid::kBrick;
 constexpr auto kVolume = std::size_t(BrickGrid::kVolume);
 constexpr std::size_t kBricksPerTask = 32;
 /// Bricks along z that are packed before samples below them are given back.
@@ -25,21 +24,8 @@ constexpr int kGroup = 8;
 
 /// Writes the kVolume samples of a brick with its borders to `stored`.
 void withBorders(const BrickSamples& samples, const Vec3i& brick, float* stored) {
-  std::array<const float*, 27> around;
-  for (int n = 0; n < 27; ++n)
-    around[std::size_t(n)] =
-        samples.pool[std::size_t(samples.poolIndex(brick + Vec3i{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1}))];
-  for (int z = -BrickGrid::kBefore; z < kBrick + BrickGrid::kAfter; ++z)
-    for (int y = -BrickGrid::kBefore; y < kBrick + BrickGrid::kAfter; ++y) {
-      const int row = (brickOf(z) + 1) * 9 + (brickOf(y) + 1) * 3;
-      const int offset = BrickSamples::offset(0, insideBrick(y), insideBrick(z));
-      const float* before = around[std::size_t(row)] + offset;
-      const float* own = around[std::size_t(row) + 1] + offset;
-      const float* after = around[std::size_t(row) + 2] + offset;
-      stored = std::copy_n(before + kBrick - BrickGrid::kBefore, BrickGrid::kBefore, stored);
-      stored = std::copy_n(own, kBrick, stored);
-      stored = std::copy_n(after, BrickGrid::kAfter, stored);
-    }
+  for (const BorderPart& part : kBorderParts)
+    copyPart(part, samples.pool[std::size_t(samples.table.at(brick + part.side))], kOwnStrides, 1.0f, stored);
 }
 
 }  // namespace
@@ -49,7 +35,7 @@ void BrickSamples::append(const std::vector<Vec3i>& bricks) {
   Store store{SampleStore(bricks.size() * kCount), bricks[0].z};
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     store.lastZ = std::max(store.lastZ, bricks[i].z);
-    table[places.numberOf(bricks[i])] = std::int32_t(pool.size());
+    table[bricks[i]] = std::int32_t(pool.size());
     placed.push_back({std::int32_t(pool.size()), bricks[i]});
     pool.push_back(store.samples.data() + i * kCount);
     ranges.emplace_back();
@@ -64,17 +50,17 @@ void BrickSamples::separate() {
   const std::vector<Interval> sourceRanges = ranges;
   std::vector<Vec3i> bricks;
   std::vector<std::size_t> source;
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const auto constant = std::size_t(table[i]);
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    const auto constant = std::size_t(table.entries[i]);
     if (constant == 0 || constant >= constants) continue;
-    bricks.push_back(places.at(i));
+    bricks.push_back(places().at(i));
     source.push_back(constant);
   }
   pool.erase(pool.begin() + 1, pool.begin() + std::ptrdiff_t(constants));
   ranges.erase(ranges.begin() + 1, ranges.begin() + std::ptrdiff_t(constants));
   for (PlacedBrick& brick : placed) {
     brick.pool -= std::int32_t(constants - 1);
-    table[places.numberOf(brick.brick)] = brick.pool;
+    table[brick.brick] = brick.pool;
   }
   const std::size_t first = pool.size();
   append(bricks);
@@ -85,7 +71,7 @@ void BrickSamples::separate() {
 }
 
 std::shared_ptr<PackedGrid> emptyPackedGrid(const BrickSamples& samples) {
-  return std::make_shared<PackedGrid>(Lattice::uniform(samples.voxelSize), samples.places,
+  return std::make_shared<PackedGrid>(Lattice::uniform(samples.voxelSize), samples.places(),
                                       samples.background);
 }
 
@@ -94,7 +80,7 @@ void appendPacked(PackedGrid& grid, BrickSamples samples, const std::vector<Pack
   for (const PlacedBrick& brick : samples.placed)
     if (packing[std::size_t(brick.pool)] != Packing::leaveOut) chosen.push_back(brick);
   const auto groupOf = [&](const PlacedBrick& brick) {
-    return (brick.brick.z - samples.places.first.z) / kGroup;
+    return (brick.brick.z - samples.places().first.z) / kGroup;
   };
   std::stable_sort(chosen.begin(), chosen.end(),
                    [&](const PlacedBrick& a, const PlacedBrick& b) { return groupOf(a) < groupOf(b); });
@@ -120,7 +106,7 @@ void appendPacked(PackedGrid& grid, BrickSamples samples, const std::vector<Pack
       }
     });
     // The next group reads one brick below its own.
-    const int needed = samples.places.first.z + (group + 1) * kGroup - 1;
+    const int needed = samples.places().first.z + (group + 1) * kGroup - 1;
     for (BrickSamples::Store& store : samples.stores)
       if (store.lastZ < needed) store.samples = {};
     first = last;
@@ -136,9 +122,9 @@ std::shared_ptr<PackedGrid> packed(BrickSamples samples) {
     const std::array<float, kVolume> none{};
     grid->encode(std::int32_t(c), none.data(), samples.ranges[c]);
   }
-  for (std::size_t i = 0; i < samples.table.size(); ++i)
-    if (samples.table[i] > 0 && std::size_t(samples.table[i]) < constants)
-      grid->place(samples.places.at(i), samples.table[i]);
+  for (std::size_t i = 0; i < samples.table.entries.size(); ++i)
+    if (const std::int32_t pool = samples.table.entries[i]; pool > 0 && std::size_t(pool) < constants)
+      grid->place(samples.places().at(i), pool);
   const std::vector<Packing> all(samples.pool.size(), Packing::whole);
   appendPacked(*grid, std::move(samples), all);
   return grid;

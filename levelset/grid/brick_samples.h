@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "nephele/levelset/grid/bake.h"
-#include "nephele/levelset/grid/brick_box.h"
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/brick_table.h"
+#include "nephele/levelset/grid/packed_grid.h"
 #include "nephele/modeling/base/system.h"
 
 /// Sparse grids while they are made: bricks without the borders that interpolation reads. For the
@@ -48,7 +48,7 @@ class SampleStore {
 /// What a BrickGrid is made from: the same table, and of every brick in the pool its own 8^3 samples, two
 /// fifths of what it stores with borders.
 struct BrickSamples {
-  static constexpr int kCount = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+  static constexpr int kCount = kBrickSamples;
   /// The samples of some bricks, none of which lies above `lastZ`.
   struct Store {
     SampleStore samples;
@@ -57,9 +57,8 @@ struct BrickSamples {
 
   float voxelSize = 1.0f;
   float background = 0.0f;
-  BrickBox places;
-  /// Index into the pool for each brick of these. Pool brick 0 is all background.
-  std::vector<std::int32_t> table;
+  /// Indices into the pool. Pool brick 0 is all background.
+  FlatBrickTable table;
   /// kCount samples of each, x fastest. Bricks of nothing but the background may share those of brick 0.
   std::vector<float*> pool;
   /// Of those samples.
@@ -68,8 +67,8 @@ struct BrickSamples {
   std::vector<PlacedBrick> placed;
   std::vector<Store> stores;
 
-  /// Pool index of the brick at brick coordinates `b`; 0 outside the table.
-  std::int32_t poolIndex(const Vec3i& b) const { return places.covers(b) ? table[places.numberOf(b)] : 0; }
+  /// The box of all positions.
+  const BrickBox& places() const { return table.box; }
   /// Where sample (x, y, z) of a brick stands among its samples; coordinates 0 to 7.
   static constexpr int offset(int x, int y, int z) {
     return (z * BrickGrid::kBrick + y) * BrickGrid::kBrick + x;

@@ -14,6 +14,14 @@ void requireHoldable(const std::string& maker, double bricksX, double bricksY, d
                       maker, bricksX * kBrickSide, bricksY * kBrickSide, bricksZ * kBrickSide));
 }
 
+void requireHoldable(const std::string& maker, const Box& box, float voxelSize) {
+  const Vec3d bricks = Vec3d(box.size()) / double(voxelSize * kBrickSide) + Vec3d{2, 2, 2};
+  requireHoldable(maker, bricks.x, bricks.y, bricks.z);
+  require(double(length(max(box.max, -box.min))) / double(voxelSize) < kLargestIndex,
+          fmt::format("{}: the shape lies too far from the origin for voxels of {:g}; use larger voxels",
+                      maker, voxelSize));
+}
+
 }  // namespace nephele
 
 namespace nephele::detail {

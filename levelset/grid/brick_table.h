@@ -5,22 +5,23 @@
 #include <vector>
 
 #include "nephele/levelset/grid/brick_box.h"
+#include "nephele/modeling/base/box.h"
 
 namespace nephele {
-
-/// Samples that a brick has of its own along each axis, and in all.
-inline constexpr int kBrickSide = 8;
-inline constexpr int kBrickSamples = kBrickSide * kBrickSide * kBrickSide;
 
 /// What every sparse grid can hold, and so what each way of making one accepts: bricks are numbered by 31
 /// bits, and so are the places of a box.
 inline constexpr double kMostBricks = 2147483647.0;
+/// Coordinates of voxels go so far from 0.
+inline constexpr double kLargestIndex = 1e9;
 
 /// @throws Error, which begins with `maker`, if a box of so many bricks along each axis has too many places.
 void requireHoldable(const std::string& maker, double bricksX, double bricksY, double bricksZ);
 inline void requireHoldable(const std::string& maker, const BrickBox& box) {
   requireHoldable(maker, box.count.x, box.count.y, box.count.z);
 }
+/// The same for the voxels of this size in a box in the world; they must lie within kLargestIndex, too.
+void requireHoldable(const std::string& maker, const Box& box, float voxelSize);
 
 }  // namespace nephele
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/packed_grid.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/field/field.h"
 

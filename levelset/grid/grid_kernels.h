@@ -1,6 +1,6 @@
 #pragma once
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/packed_grid.h"
 #include "nephele/modeling/field/field_node.h"
 
 /// Interpolation of a grid, packed or not, at a block of points: what `gridField` and everything else that

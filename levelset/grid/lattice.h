@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "nephele/levelset/grid/brick_box.h"
 #include "nephele/modeling/base/math.h"
 
 namespace nephele {
@@ -22,6 +23,14 @@ struct Lattice {
     return {indexToWorld, inverse(indexToWorld), std::cbrt(std::abs(determinant(indexToWorld.linear)))};
   }
 };
+
+/// The brick of the lattice that `point` (world) lies in; far away where the point is not finite.
+inline Vec3i brickAt(const Lattice& lattice, const Vec3f& point) {
+  constexpr float kFar = 1e9f;
+  const Vec3f q = lattice.worldToIndex(point);
+  const auto along = [](float x) { return brickOf(x > -kFar && x < kFar ? int(std::floor(x)) : int(kFar)); };
+  return {along(q.x), along(q.y), along(q.z)};
+}
 
 /// The lattice with voxels `factor` times as wide, > 0; voxel (0, 0, 0) stays.
 inline Lattice coarser(const Lattice& lattice, float factor) {

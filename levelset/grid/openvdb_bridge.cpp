@@ -77,8 +77,7 @@ BlockTable blocksOf(const FloatTree& tree, const std::string& name) {
   last += one;
   requireHoldable("grid " + name, double(last.x) - first.x + 1, double(last.y) - first.y + 1,
                   double(last.z) - first.z + 1);
-  result.box = {first, last - first + one};
-  result.codes.assign(result.box.size(), 0);
+  result.codes = FlatBrickTable({first, last - first + one});
 
   std::map<float, std::int32_t> codes;
   const auto codeOf = [&](float value) {
@@ -96,12 +95,9 @@ BlockTable blocksOf(const FloatTree& tree, const std::string& name) {
           lastValue = value;
           lastCode = codeOf(value);
         }
-        for (int z = low.z; z < low.z + span; ++z)
-          for (int y = low.y; y < low.y + span; ++y)
-            std::fill_n(result.codes.begin() + std::ptrdiff_t(result.box.numberOf({low.x, y, z})), span,
-                        lastCode);
+        result.codes.fill(low, low + Vec3i{span, span, span}, lastCode);
       },
-      [&](const Vec3i& brick, const auto&) { result.codes[result.box.numberOf(brick)] = nextLeaf++; });
+      [&](const Vec3i& brick, const auto&) { result.codes[brick] = nextLeaf++; });
   return result;
 }
 
@@ -139,12 +135,6 @@ void transpose(const Source* samples, int rowLength, int sliceLength, Target* le
         leaf[leafOffset(x, y, z)] = Target(samples[z * sliceLength + y * rowLength + x]);
 }
 
-void requireFinite(const float* values, int count, const std::string& name) {
-  bool finite = true;
-  for (int i = 0; i < count; ++i) finite &= std::isfinite(values[i]);
-  require(finite, fmt::format("grid '{}' holds values that are not finite", name));
-}
-
 /// A leaf or a tile of samples whose rows and slices follow at these distances.
 LeafOrTile<float> leafOfSamples(const float* samples, int rowLength, int sliceLength,
                                 const openvdb::Coord& origin, const TreeValues& treeValues,
@@ -165,7 +155,7 @@ LeafOrTile<float> tileOf(float constant, const TreeValues& values, const std::st
 TreeValues levelSetOf(float background, float halfWidth, const std::string& name) {
   require(background < 0.0f,
           fmt::format("grid {}: a level set must be negative outside, but its background is {}",
-                      name.empty() ? "without a name" : "'" + name + "'", background));
+                      displayName(name), background));
   return {-1.0f, -halfWidth, halfWidth, halfWidth, TreeValues::Active::insideBand};
 }
 
@@ -208,8 +198,12 @@ void initializeOpenVdb() {
   std::call_once(once, [] { openvdb::initialize(); });
 }
 
+std::string displayName(const std::string& name) {
+  return name.empty() ? "without a name" : "'" + name + "'";
+}
+
 std::string displayName(const openvdb::GridBase& grid) {
-  return grid.getName().empty() ? "without a name" : "'" + grid.getName() + "'";
+  return displayName(grid.getName());
 }
 
 Lattice latticeOf(const openvdb::GridBase& grid) {
@@ -252,8 +246,8 @@ std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign) 
   BlockTable blocks = blocksOf(grid.tree(), name);
   blocks.sign = sign;
   const Lattice lattice = latticeOf(grid);
-  if (!blocks.codes.empty())
-    requireResolvedVoxels(grid, blocks.box.first * kBrick, (blocks.box.first + blocks.box.count) * kBrick);
+  if (const BrickBox& box = blocks.codes.box; box.size() > 0)
+    requireResolvedVoxels(grid, box.first * kBrick, (box.first + box.count) * kBrick);
   return gatherBricks(blocks, lattice, Beside::varying, name);
 }
 

@@ -17,6 +17,7 @@ namespace nephele::detail {
 void initializeOpenVdb();
 
 /// What a grid is called in messages.
+std::string displayName(const std::string& name);
 std::string displayName(const openvdb::GridBase& grid);
 
 /// Where the voxels of a grid stand. @throws Error naming the grid if its transform is not linear or is

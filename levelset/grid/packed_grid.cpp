@@ -1,7 +1,8 @@
+#include "nephele/levelset/grid/packed_grid.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -55,11 +56,9 @@ void PackedGrid::reserve(std::size_t bricks) {
 }
 
 std::int32_t PackedGrid::append(std::size_t bricks) {
-  const std::size_t first = poolSize();
-  requirePool(first + bricks);
-  codes_.resize((first + bricks) * kVolume);
-  ranges_.resize(first + bricks, Interval::of(0.0f));
-  return std::int32_t(first);
+  requirePool(poolSize() + bricks);
+  codes_.resize((poolSize() + bricks) * kVolume);
+  return appendRanges(bricks);
 }
 
 void PackedGrid::encode(std::int32_t pool, const float* samples, const Interval& range) {
@@ -73,17 +72,13 @@ void PackedGrid::encode(std::int32_t pool, const float* samples, const Interval&
 }
 
 float PackedGrid::at(const Vec3i& voxel) const {
-  const Vec3i b = brickOf(voxel);
-  if (!covers(b)) return background();
-  const std::int32_t pool = poolIndex(b);
+  const std::int32_t pool = poolIndex(brickOf(voxel));
   const Code code = Code::of(ranges()[std::size_t(pool)]);
-  const int offset = sampleOffset(insideBrick(voxel.x), insideBrick(voxel.y), insideBrick(voxel.z));
-  return code.low + code.unit * float(codes(pool)[offset]);
+  return code.low + code.unit * float(codes(pool)[sampleOffset(insideBrick(voxel))]);
 }
 
 std::size_t PackedGrid::memoryBytes() const {
-  return sizeof(PackedGrid) + table().capacity() * sizeof(std::int32_t) +
-         codes_.capacity() * sizeof(std::uint16_t) + ranges().capacity() * sizeof(Interval);
+  return sizeof(PackedGrid) + layoutBytes() + codes_.capacity() * sizeof(std::uint16_t);
 }
 
 }  // namespace nephele

@@ -109,7 +109,6 @@ class BrickLists {
       }
     low *= perVoxel_;
     high *= perVoxel_;
-    constexpr double kLargestIndex = 1e9;
     const Vec3d size = (high - low) * (1.0 / kBrick) + Vec3d(1, 1, 1) * (band_ / 4 + 4);
     requireHoldable("level set", size.x, size.y, size.z);
     require(std::max({-low.x, -low.y, -low.z, high.x, high.y, high.z}) + band_ < kLargestIndex,

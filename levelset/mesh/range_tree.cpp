@@ -1,25 +1,17 @@
-// Boxes split at the median of their longest side, down to a few items. A query adds the range of a node only
-// while it can still widen the result, so that large boxes over values that vary little stay cheap.
+// A query adds the range of a node only while it can still widen the result, so that large boxes over values
+// that vary little stay cheap.
 #include "nephele/levelset/mesh/range_tree.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace nephele::detail {
 
 namespace {
 
-constexpr std::size_t kLeaf = 8;
-/// Enough for halving 2^64 items.
-constexpr std::size_t kDepth = 72;
+constexpr std::uint32_t kMostInLeaf = 8;
 
-bool isLeaf(std::size_t first, std::size_t last) {
-  return last - first <= kLeaf;
-}
-
-}  // namespace
-
+/// 0 where they touch.
 float distance(const Box& a, const Box& b) {
   Vec3f gap;
   for (int axis = 0; axis < 3; ++axis)
@@ -27,56 +19,48 @@ float distance(const Box& a, const Box& b) {
   return length(gap);
 }
 
-RangeTree::RangeTree(std::vector<Item> items) : items_(std::move(items)) {
-  if (!items_.empty()) build(0, 0, items_.size());
+std::vector<Box> boxesOf(const std::vector<RangeTree::Item>& items) {
+  std::vector<Box> boxes;
+  boxes.reserve(items.size());
+  for (const RangeTree::Item& item : items) boxes.push_back(item.box);
+  return boxes;
 }
 
-void RangeTree::build(std::size_t node, std::size_t first, std::size_t last) {
-  if (nodes_.size() <= node) nodes_.resize(node + 1);
-  Box box = items_[first].box;
-  Interval range = items_[first].range;
-  for (std::size_t i = first + 1; i < last; ++i) {
-    box = box.including(items_[i].box);
-    range = range.hull(items_[i].range);
+}  // namespace
+
+RangeTree::RangeTree(const std::vector<Item>& items) : tree_(boxesOf(items), kMostInLeaf) {
+  ranges_.reserve(items.size());
+  for (std::uint32_t place = 0; place < items.size(); ++place)
+    ranges_.push_back(items[tree_.item(place)].range);
+  nodeRanges_.resize(tree_.nodeCount());
+  for (auto n = std::uint32_t(tree_.nodeCount()); n-- > 0;) {
+    if (!tree_.isLeaf(n)) {
+      nodeRanges_[n] = nodeRanges_[tree_.left(n)].hull(nodeRanges_[tree_.right(n)]);
+      continue;
+    }
+    const auto& leaf = tree_.node(n);
+    nodeRanges_[n] = ranges_[leaf.begin];
+    for (std::uint32_t place = leaf.begin + 1; place < leaf.end; ++place)
+      nodeRanges_[n] = nodeRanges_[n].hull(ranges_[place]);
   }
-  nodes_[node] = {box, range, first, last};
-  if (isLeaf(first, last)) return;
-  const Vec3f size = box.size();
-  const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
-  const std::size_t middle = first + (last - first) / 2;
-  const auto at = [&](std::size_t i) { return items_.begin() + std::ptrdiff_t(i); };
-  std::nth_element(at(first), at(middle), at(last), [axis](const Item& a, const Item& b) {
-    return a.box.min[axis] + a.box.max[axis] < b.box.min[axis] + b.box.max[axis];
-  });
-  build(2 * node + 1, first, middle);
-  build(2 * node + 2, middle, last);
 }
 
 std::optional<Interval> RangeTree::near(const Box& box, float reach) const {
   std::optional<Interval> result;
-  if (nodes_.empty()) return result;
   const auto isNear = [&](const Box& other) { return !(distance(box, other) > reach); };
-  std::array<std::size_t, kDepth> stack;
-  std::size_t height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const std::size_t index = stack[--height];
-    const Node& node = nodes_[index];
-    if ((result && result->contains(node.range)) || !isNear(node.box)) continue;
-    if (!isLeaf(node.first, node.last)) {
-      stack[height++] = 2 * index + 1;
-      stack[height++] = 2 * index + 2;
-      continue;
-    }
-    for (std::size_t i = node.first; i < node.last; ++i)
-      if (isNear(items_[i].box)) result = result ? result->hull(items_[i].range) : items_[i].range;
-  }
+  tree_.walk(
+      [&](std::uint32_t n) {
+        return !(result && result->contains(nodeRanges_[n])) && isNear(tree_.node(n).box);
+      },
+      [&](std::uint32_t place) {
+        if (isNear(tree_.box(place))) result = result ? result->hull(ranges_[place]) : ranges_[place];
+      });
   return result;
 }
 
 std::optional<Interval> RangeTree::all() const {
-  if (nodes_.empty()) return std::nullopt;
-  return nodes_[0].range;
+  if (tree_.isEmpty()) return std::nullopt;
+  return nodeRanges_[0];
 }
 
 }  // namespace nephele::detail

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "nephele/levelset/mesh/box_tree.h"
 #include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/interval.h"
 
@@ -17,7 +18,7 @@ class RangeTree {
   };
 
   /// n log n in the number of items.
-  explicit RangeTree(std::vector<Item> items);
+  explicit RangeTree(const std::vector<Item>& items);
 
   /// Hull of the ranges of all items whose box is within `reach` of `box`; nothing if there are none.
   std::optional<Interval> near(const Box& box, float reach) const;
@@ -25,20 +26,9 @@ class RangeTree {
   std::optional<Interval> all() const;
 
  private:
-  /// Items [first, last), and of those the two halves in the nodes 2 i + 1 and 2 i + 2 unless it is a leaf.
-  struct Node {
-    Box box;
-    Interval range;
-    std::size_t first = 0, last = 0;
-  };
-
-  void build(std::size_t node, std::size_t first, std::size_t last);
-
-  std::vector<Item> items_;
-  std::vector<Node> nodes_;
+  BoxTree<Box> tree_;
+  /// Of the places and of the nodes of the tree.
+  std::vector<Interval> ranges_, nodeRanges_;
 };
-
-/// Distance between two boxes; 0 where they touch.
-float distance(const Box& a, const Box& b);
 
 }  // namespace nephele::detail

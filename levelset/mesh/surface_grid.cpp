@@ -6,8 +6,6 @@
 // tells its node to ask the next coarser one, and the last of them the exact field.
 #include "nephele/levelset/mesh/surface_grid.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include <map>
 
 #include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/grid_kernels.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/grid/lattice.h"
@@ -269,14 +268,8 @@ float reachOfGrid(float voxelSize, int level) {
 
 /// The finest grid is the largest table.
 void requireTable(const Box& surface, const SurfaceGridOptions& options) {
-  constexpr double kLargestTable = double(1 << 28), kLargestIndex = 1e9;
   const float h = options.voxelSize;
-  const Box box = surface.expanded(std::min(reachOfGrid(h, 0), options.band));
-  const Vec3d bricks = Vec3d(box.size()) / double(h * kBrick) + Vec3d{2, 2, 2};
-  require(
-      bricks.x * bricks.y * bricks.z < kLargestTable &&
-          double(length(max(box.max, -box.min))) / double(h) < kLargestIndex,
-      fmt::format("surface grid: voxelSize {} is too small for a mesh {} wide", h, surface.longestSide()));
+  requireHoldable("surface grid", surface.expanded(std::min(reachOfGrid(h, 0), options.band)), h);
 }
 
 }  // namespace

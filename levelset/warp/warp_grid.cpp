@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -48,7 +49,6 @@ WarpBricks::WarpBricks(const ScalarField& object, const Box& box, const WarpGrid
   const Vec3d origin = length(centre) > kFar * std::max(double(box.longestSide()), h) ? centre : Vec3d{};
   const Affine map{Mat3f::scaling(float(h)), Vec3f(origin)};
   lattice_ = {map, inverse(map), float(h)};
-  double count = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = (double(box.min[axis]) - across - origin[axis]) / h,
                  high = (double(box.max[axis]) + across - origin[axis]) / h;
@@ -56,9 +56,8 @@ WarpBricks::WarpBricks(const ScalarField& object, const Box& box, const WarpGrid
             fmt::format("warp grid: voxels of {:g} are too small for the object", h));
     box_.first[axis] = brickOf(int(std::floor(low)));
     box_.count[axis] = brickOf(int(std::ceil(high))) - box_.first[axis] + 1;
-    count *= box_.count[axis];
   }
-  require(count < 2e9, fmt::format("warp grid: voxels of {:g} are too small for the object", h));
+  requireHoldable("warp grid", box_);
   bound_ = float(across);
 
   table_.resize(box_.size());

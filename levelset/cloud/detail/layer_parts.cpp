@@ -20,14 +20,15 @@ constexpr double kPartPositions = 1 << 18;
 BrickSamples noSamples(const Box& box, float voxelSize, const BrickSlab& slab) {
   BrickSamples samples;
   samples.voxelSize = voxelSize;
+  BrickBox places;
   for (int axis = 0; axis < 3; ++axis) {
-    samples.places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-    samples.places.count[axis] =
-        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - samples.places.first[axis];
+    places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
+    places.count[axis] =
+        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - places.first[axis];
   }
-  samples.places.first.z = slab.begin;
-  samples.places.count.z = slab.end - slab.begin;
-  samples.table.resize(samples.places.size());
+  places.first.z = slab.begin;
+  places.count.z = slab.end - slab.begin;
+  samples.table = FlatBrickTable(places);
   SampleStore background(BrickSamples::kCount);
   samples.pool.push_back(background.data());
   samples.ranges.push_back(Interval::of(0));
@@ -57,15 +58,15 @@ BrickSamples windowOf(const std::deque<LayerPart>& parts, const BrickSlab& slab,
     std::vector<Vec3i> bricks;
     std::vector<const float*> sources;
     for (const LayerPart& part : parts) {
-      const Vec3i first = max(window.places.first, part.samples.places.first);
-      const Vec3i end = min(window.places.first + window.places.count,
-                            part.samples.places.first + part.samples.places.count);
+      const Vec3i first = max(window.places().first, part.samples.places().first);
+      const Vec3i end = min(window.places().first + window.places().count,
+                            part.samples.places().first + part.samples.places().count);
       const int lastZ = std::min({z + kStoreBricks, end.z, part.slab.end});
       Vec3i b;
       for (b.z = std::max({z, first.z, part.slab.begin}); b.z < lastZ; ++b.z)
         for (b.y = first.y; b.y < end.y; ++b.y)
           for (b.x = first.x; b.x < end.x; ++b.x) {
-            const std::int32_t pool = part.samples.poolIndex(b);
+            const std::int32_t pool = part.samples.table.at(b);
             if (pool == 0) continue;
             bricks.push_back(b);
             sources.push_back(part.samples.pool[std::size_t(pool)]);

@@ -15,9 +15,8 @@ struct BlockTable {
   /// How the samples of blocks follow each other.
   enum class Order { xFastest, zFastest };
 
-  BrickBox box;
-  /// For each brick of the box: n > 0 is blocks[n - 1], else constants[-n].
-  std::vector<std::int32_t> codes;
+  /// For each brick: n > 0 is blocks[n - 1], else constants[-n].
+  FlatBrickTable codes;
   /// The first is the background, which is also what stands beyond the box.
   std::vector<float> constants;
   std::vector<const float*> blocks;
@@ -28,6 +27,9 @@ struct BlockTable {
   float constant(std::int32_t code) const { return constants[std::size_t(-code)]; }
   const float* block(std::int32_t code) const { return blocks[std::size_t(code) - 1]; }
 };
+
+/// @throws Error, naming the grid, if one of the samples is not finite.
+void requireFinite(const float* samples, int count, const std::string& name);
 
 /// Bricks with borders. Uses all cores; the result does not depend on their number.
 /// @throws Error, naming the grid, if a value is not finite or there are more bricks than can be numbered.

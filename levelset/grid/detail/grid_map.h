@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/packed_grid.h"
 #include "nephele/modeling/field/field_node.h"
 
 /// What the kernels of grids and their plain loops share.

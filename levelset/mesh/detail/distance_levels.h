@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/grid/packed_grid.h"
 #include "nephele/modeling/field/field.h"
 
 namespace nephele::detail {

@@ -331,7 +331,7 @@ detail::BrickSamples samplesOf(const ScalarField& field) {
 }
 
 float sampleAt(const detail::BrickSamples& samples, const Vec3i& voxel) {
-  const float* brick = samples.pool[std::size_t(samples.poolIndex(brickOf(voxel)))];
+  const float* brick = samples.pool[std::size_t(samples.table.at(brickOf(voxel)))];
   return brick[detail::BrickSamples::offset(insideBrick(voxel.x), insideBrick(voxel.y),
                                             insideBrick(voxel.z))];
 }

@@ -46,10 +46,10 @@ TEST(BrickSamples, SeparateGivesConstantsPlacesOfTheirOwn) {
   ASSERT_LT(samples.placed.size() + 1, samples.pool.size());
   samples.separate();
   EXPECT_EQ(samples.placed.size() + 1, samples.pool.size());
-  for (const PlacedBrick& brick : samples.placed) EXPECT_EQ(samples.poolIndex(brick.brick), brick.pool);
+  for (const PlacedBrick& brick : samples.placed) EXPECT_EQ(samples.table.at(brick.brick), brick.pool);
   const Vec3i inside = brickOf(Vec3i{-12, 3, 3}), beyond = brickOf(Vec3i{12, 3, 3});
-  EXPECT_EQ(samples.pool[std::size_t(samples.poolIndex(inside))][0], 1.0f);
-  EXPECT_EQ(samples.pool[std::size_t(samples.poolIndex(beyond))][0], 3.0f);
+  EXPECT_EQ(samples.pool[std::size_t(samples.table.at(inside))][0], 1.0f);
+  EXPECT_EQ(samples.pool[std::size_t(samples.table.at(beyond))][0], 3.0f);
 }
 
 TEST(BrickSamples, AppendedBricksFollowTheOthers) {

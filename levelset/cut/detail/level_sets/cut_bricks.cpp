@@ -7,8 +7,6 @@
 // or whose boundary can be near.
 #include "nephele/levelset/cut/detail/level_sets/cut_bricks.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +14,7 @@
 #include <numeric>
 
 #include "nephele/levelset/cut/detail/level_sets/cut_sampler.h"
+#include "nephele/levelset/grid/brick_table.h"
 #include "nephele/levelset/grid/lattice.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -96,11 +95,7 @@ class Walk {
     const auto brickOfPoint = [width](const Vec3f& p) {
       return Vec3i{int(std::floor(p.x / width)), int(std::floor(p.y / width)), int(std::floor(p.z / width))};
     };
-    constexpr double kMostBricks = double(1 << 28), kLargestIndex = 1e9;
-    const Vec3d bricks = Vec3d(box.size()) / double(width) + Vec3d{2, 2, 2};
-    require(bricks.x * bricks.y * bricks.z < kMostBricks &&
-                double(length(max(box.max, -box.min))) / double(h_) < kLargestIndex,
-            fmt::format("cut: voxelSize {} is too small for a shape {} wide", h_, box.longestSide()));
+    requireHoldable("cut", box, h_);
     const Vec3i first = brickOfPoint(box.min), last = brickOfPoint(box.max);
     constexpr int kFirstEdge = 16;
     const CutKnowledge* nothing = knowNothing();

@@ -146,30 +146,29 @@ std::vector<double> PieceSamples::smallVolumes(const std::vector<bool>& isSmall,
 }
 
 /// Each as large as it must be, with no samples yet.
-std::vector<PieceLevelSet::Table> PieceSamples::emptyTables() const {
+std::vector<FlatBrickTable> PieceSamples::emptyTables() const {
   const std::size_t count = shells_.ownerCount();
-  std::vector<PieceLevelSet::Table> tables(count);
+  std::vector<FlatBrickTable> tables(count);
   std::vector<Vec3i> last(count);
   for (std::size_t i = 0; i < shells_.cut().count(); ++i)
     for (const NearOwner& near : shells_.near().of(i)) {
-      PieceLevelSet::Table& table = tables[near.owner];
+      FlatBrickTable& table = tables[near.owner];
       const Vec3i& at = shells_.brick(i).brick;
-      const bool isFirst = table.bricks.count.x == 0;
-      table.bricks.first = isFirst ? at : min(table.bricks.first, at);
+      const bool isFirst = table.box.count.x == 0;
+      table.box.first = isFirst ? at : min(table.box.first, at);
       last[near.owner] = isFirst ? at : max(last[near.owner], at);
-      table.bricks.count.x = 1;
+      table.box.count.x = 1;
     }
   for (std::size_t p = 0; p < count; ++p) {
-    PieceLevelSet::Table& table = tables[p];
-    table.bricks.count = last[p] - table.bricks.first + Vec3i{1, 1, 1};
-    table.entries.assign(table.bricks.size(), PieceLevelSet::kOutside);
+    FlatBrickTable& table = tables[p];
+    table = FlatBrickTable({table.box.first, last[p] - table.box.first + Vec3i{1, 1, 1}});
   }
   return tables;
 }
 
 std::vector<PieceLevelSet> PieceSamples::levelSets(const Progress& progress) const {
   // Boxes first, then places for samples, as they are needed.
-  std::vector<PieceLevelSet::Table> tables = emptyTables();
+  std::vector<FlatBrickTable> tables = emptyTables();
   const auto samples = std::make_shared<LargeArray>(shells_.near().items.size() * kSamples);
   std::atomic<std::int32_t> used{0};
   parallelFor(
@@ -181,8 +180,7 @@ std::vector<PieceLevelSet> PieceSamples::levelSets(const Progress& progress) con
         for (std::size_t i = begin; i < end; ++i)
           for (const NearOwner& near : shells_.near().of(i)) {
             look(view, std::int32_t(i), near.owner, shells_.ownedBy(near.owner, std::int32_t(i)));
-            std::int32_t& entry =
-                tables[near.owner].entries[tables[near.owner].bricks.numberOf(shells_.brick(i).brick)];
+            std::int32_t& entry = tables[near.owner][shells_.brick(i).brick];
             if (view.kind != View::Kind::mixed) {
               entry = view.kind == View::Kind::inside ? PieceLevelSet::kInside : PieceLevelSet::kOutside;
               continue;
@@ -197,7 +195,7 @@ std::vector<PieceLevelSet> PieceSamples::levelSets(const Progress& progress) con
       },
       progress);
   std::vector<PieceLevelSet> levels;
-  for (PieceLevelSet::Table& table : tables) levels.emplace_back(h_, band_, std::move(table), samples);
+  for (FlatBrickTable& table : tables) levels.emplace_back(h_, band_, std::move(table), samples);
   return levels;
 }
 

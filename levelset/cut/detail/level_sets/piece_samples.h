@@ -53,7 +53,7 @@ class PieceSamples {
   Interval evaluate(View& view, std::vector<float>& planes, float* values) const;
   void evaluateSome(const View& view, std::span<const std::uint16_t> samples, float* values) const;
   double volumeIn(const Vec3i& at, std::uint32_t owner, Work& work) const;
-  std::vector<PieceLevelSet::Table> emptyTables() const;
+  std::vector<FlatBrickTable> emptyTables() const;
 
   const CutPlan& plan_;
   const CutShells& shells_;
