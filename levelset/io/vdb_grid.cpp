@@ -115,11 +115,14 @@ void copyMetadata(const VdbGrid& from, VdbGrid& to) {
   to.impl().grid->insertMeta(*from.impl().grid);
 }
 
-VdbValues valuesOf(const VdbGrid& grid) {
-  const openvdb::GridBase& base = *grid.impl().grid;
+VdbValues detail::valuesOf(const openvdb::GridBase& base) {
   if (base.isType<openvdb::FloatGrid>() || base.isType<openvdb::DoubleGrid>()) return VdbValues::scalar;
   if (base.isType<openvdb::Vec3SGrid>() || base.isType<openvdb::Vec3DGrid>()) return VdbValues::vector;
   return VdbValues::other;
+}
+
+VdbValues valuesOf(const VdbGrid& grid) {
+  return detail::valuesOf(*grid.impl().grid);
 }
 
 Box activeBox(const VdbGrid& grid) {

@@ -70,7 +70,7 @@ std::vector<VdbGrid> wrapped(const std::vector<openvdb::GridBase::Ptr>& grids) {
 }
 
 bool isScalar(const openvdb::GridBase& grid) {
-  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
+  return detail::valuesOf(grid) == VdbValues::scalar;
 }
 
 }  // namespace

@@ -23,6 +23,9 @@ inline VdbGrid wrapGrid(openvdb::GridBase::Ptr grid) {
   return VdbGrid(std::make_shared<VdbGrid::Impl>(VdbGrid::Impl{std::move(grid)}));
 }
 
+/// As that of VdbGrid.
+VdbValues valuesOf(const openvdb::GridBase& grid);
+
 /// The grid as float values. @throws Error naming the grid and its type if it is not a float grid.
 openvdb::FloatGrid::ConstPtr floatGrid(const VdbGrid& grid);
 
