@@ -1,20 +1,15 @@
 // The verb render, through the program.
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
 
-#include "nephele/levelset/grid/openvdb_instances.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
-#include "tests/support/test_data.h"
 
 namespace nephele::test {
 namespace {
@@ -331,148 +326,12 @@ TEST_F(RenderVerb, RefusesFilesThatHoldNoDensity) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
-TEST(RenderData, RefusesALevelSetAndSaysWhatMakesADensityOfIt) {
-  const std::string path = sharedData("volumes/cube_levelset.vdb");
-  NEPHELE_REQUIRE_SHARED_DATA(path);
-  const TemporaryFolder folder;
-  const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr"));
-  EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find("level set"), std::string::npos) << result.errors;
-  EXPECT_NE(result.errors.find("nephele cloud"), std::string::npos) << result.errors;
-  EXPECT_EQ(folder.entryCount(), 0u);
-}
-
 TEST_F(RenderVerb, RefusesMoreMemoryThanItMayUse) {
   const TemporaryFolder folder;
   const ProgramResult result =
       runProgram("render " + fog() + " -o " + folder.file("a.exr") + " --size 60000x60000");
   EXPECT_EQ(result.exitCode, 1);
   EXPECT_NE(result.errors.find("--size"), std::string::npos) << result.errors;
-}
-
-TEST(RenderData, MakesPicturesOfRealVolumes) {
-  const TemporaryFolder folder;
-  for (const char* name : {"dragon_small_fog.vdb", "bifrost_torus_fog.vdb", "smoke_double_fog.vdb",
-                           "blender_fluid_5_grids.vdb"}) {
-    const std::string path = sharedData("volumes/" + std::string(name));
-    NEPHELE_REQUIRE_SHARED_DATA(path);
-    const ProgramResult result =
-        runProgram("render " + path + " -o " + folder.file("a.exr") + " --size 48x36 --samples 1");
-    ASSERT_EQ(result.exitCode, 0) << name << result.errors;
-    const Image image = readImage(folder.file("a.exr"));
-    double covered = 0;
-    for (std::size_t i = 0; i != image.channel("A").values.size(); ++i) {
-      covered += image.channel("A").values[i];
-      for (const char* channel : {"R", "G", "B", "A"})
-        ASSERT_TRUE(std::isfinite(image.channel(channel).values[i]));
-    }
-    // The automatic framing fills a fair part of the picture.
-    EXPECT_GT(covered, 0.05 * 48 * 36) << name;
-  }
-}
-
-TEST(RenderData, SaysThatAnEmptyVolumeMakesAnEmptyPicture) {
-  const std::string path = sharedData("volumes/empty_grid.vdb");
-  NEPHELE_REQUIRE_SHARED_DATA(path);
-  const TemporaryFolder folder;
-  const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr") + " --size 8x6");
-  EXPECT_EQ(result.exitCode, 0) << result.errors;
-  EXPECT_NE(result.errors.find("empty"), std::string::npos);
-  const Image image = readImage(folder.file("a.exr"));
-  for (const float alpha : image.channel("A").values) EXPECT_EQ(alpha, 0.0f);
-}
-
-// A ball of voxels of 0.1 with something wrong in it.
-std::string writeBall(const TemporaryFolder& folder, float background,
-                      const std::function<void(openvdb::FloatGrid&)>& change) {
-  openvdb::initialize();
-  auto grid = openvdb::FloatGrid::create(background);
-  auto accessor = grid->getAccessor();
-  for (int z = -6; z <= 6; ++z)
-    for (int y = -6; y <= 6; ++y)
-      for (int x = -6; x <= 6; ++x)
-        if (x * x + y * y + z * z < 36) accessor.setValue({x, y, z}, 1.0f);
-  grid->setName("density");
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
-  change(*grid);
-  openvdb::io::File file(folder.file("ball.vdb"));
-  file.write({grid});
-  file.close();
-  return folder.file("ball.vdb");
-}
-
-TEST(RenderBadInput, IsRefusedByNameAndReason) {
-  using openvdb::FloatGrid;
-  const auto set = [](float value) {
-    return [value](FloatGrid& grid) { grid.getAccessor().setValue({0, 0, 0}, value); };
-  };
-  const struct {
-    float background;
-    std::function<void(FloatGrid&)> change;
-    std::string says;
-  } cases[] = {{0, set(NAN), "holds values that are not finite"},
-               {0, set(INFINITY), "holds values that are not finite"},
-               {0, set(1e30f), "expected values up to 1e+18"},
-               {0.5f, [](FloatGrid&) {}, "expected 0 outside of the volume, but its background is 0.5"},
-               {-1, [](FloatGrid&) {}, "its background is -1"},
-               {0, [](FloatGrid& grid) { grid.setGridClass(openvdb::GRID_LEVEL_SET); }, "is a level set"},
-               {0,
-                [](FloatGrid& grid) {
-                  grid.transform().postTranslate({1e9, 0, 0});
-                },
-                "from the origin"},
-               {0,
-                [](FloatGrid& grid) {
-                  grid.setTransform(openvdb::math::Transform::createFrustumTransform(
-                      openvdb::BBoxd({-12, -12, -12}, {12, 12, 12}), 0.5, 2.0, 0.1));
-                },
-                "frustum"}};
-  for (const auto& c : cases) {
-    const TemporaryFolder files, folder;
-    const ProgramResult result = runProgram("render " + writeBall(files, c.background, c.change) + " -o " +
-                                            folder.file("a.exr") + " --size 8x6");
-    EXPECT_EQ(result.exitCode, 1) << c.says;
-    EXPECT_NE(result.errors.find("ball.vdb"), std::string::npos) << result.errors;
-    EXPECT_NE(result.errors.find(c.says), std::string::npos) << c.says << ": " << result.errors;
-    EXPECT_EQ(folder.entryCount(), 0u);
-  }
-}
-
-TEST(RenderBadInput, TransformsAreWhatTheySay) {
-  // An ellipsoid with the half axes 0.6, 1.2, 0.6, turned by 90 degrees about z: wide and low.
-  const TemporaryFolder folder;
-  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid& grid) {
-    auto map = openvdb::math::Mat4d::identity();
-    map.setToScale(openvdb::Vec3d(0.1, 0.2, 0.1));
-    grid.setTransform(openvdb::math::Transform::createLinearTransform(map));
-    grid.transform().postRotate(1.5707963267948966, openvdb::math::Z_AXIS);
-  });
-  ASSERT_EQ(runProgram("render " + path + " -o " + folder.file("a.exr") +
-                       " --size 40x40 --samples 1 --view 0,0 --projection orthographic "
-                       "--orthographic-width 4 --extinction 100")
-                .exitCode,
-            0);
-  const Image image = readImage(folder.file("a.exr"));
-  int across = 0, down = 0;
-  for (int i = 0; i != 40; ++i) {
-    across += image.at("A", i, 20) > 0.5f;
-    down += image.at("A", 20, i) > 0.5f;
-  }
-  // 2.4 and 1.2 of 4 units in 40 pixels.
-  EXPECT_NEAR(across, 24, 3);
-  EXPECT_NEAR(down, 12, 2);
-}
-
-TEST(RenderBadInput, ACameraInTheCloudSeesCloud) {
-  const TemporaryFolder folder;
-  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid&) {});
-  ASSERT_EQ(runProgram("render " + path + " -o " + folder.file("a.exr") +
-                       " --size 8x6 --camera-position 0,0,0 --look-at 0,0,1 --extinction 30")
-                .exitCode,
-            0);
-  const Image image = readImage(folder.file("a.exr"));
-  for (const float alpha : image.channel("A").values) EXPECT_GT(alpha, 0.99f);
-  for (const float red : image.channel("R").values) EXPECT_TRUE(std::isfinite(red) && red >= 0);
 }
 
 }  // namespace

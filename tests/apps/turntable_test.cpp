@@ -1,75 +1,20 @@
-// The verb turntable, through the program.
+// The verb turntable, through the program: frames, movies and sheets.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
-#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
-#include "tests/support/density.h"
+#include "tests/apps/turntable_verb.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 
 namespace nephele::test {
 namespace {
-
-namespace fs = std::filesystem;
-
-class TurntableVerb : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    data_ = new TemporaryFolder;
-    write("ball.vdb", *ball(1.0f, 0.1f));
-    // Long in z, with a thick end: from no two sides alike.
-    write("club.vdb", *densityGrid(voxels(0.1f), {-6, -6, -12}, {6, 6, 16}, [](const Vec3f& p) {
-            const float rod = 0.25f - std::hypot(p.x, p.y), end = 0.5f - length(p - Vec3f{0.1f, 0, 1.0f});
-            return std::clamp(0.5f + 10 * std::max(std::min(rod, 1.1f + p.z), end), 0.0f, 1.0f);
-          }));
-  }
-  static void TearDownTestSuite() { delete data_; }
-  static void write(const std::string& name, const BrickGrid& grid) {
-    writeVdbFile(data_->file(name), {toVdb(grid, {"density", VdbGridInfo::Class::fogVolume})}, {});
-  }
-
-  static std::string volume(const std::string& name) { return fmt::format("'{}'", data_->file(name)); }
-  // The arguments of a turntable into the test's own folder.
-  std::string call(const std::string& options, const std::string& name = "club.vdb", int samples = 1) const {
-    return fmt::format("turntable {} -o '{}' --size 64x36 --samples {} {}", volume(name),
-                       folder.file("f.####.exr"), samples, options);
-  }
-  std::string frame(int number) const { return folder.file(fmt::format("f.{:04d}.exr", number)); }
-  std::set<std::string> files() const {
-    std::set<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder.file(""))) names.insert(entry.path().filename());
-    return names;
-  }
-  nlohmann::json statistics() const { return nlohmann::json::parse(textOf(folder.file("s.json"))); }
-  static bool isWhole(const std::string& path) {
-    try {
-      return readImage(path).width > 0;
-    } catch (const Error&) {
-      return false;
-    }
-  }
-  // Mean of the green channel.
-  static double brightness(const std::string& path) {
-    double sum = 0;
-    const Image image = readImage(path);
-    for (const float value : image.channel("G").values) sum += value;
-    return sum / double(image.channel("G").values.size());
-  }
-
-  TemporaryFolder folder;
-  static inline TemporaryFolder* data_ = nullptr;
-};
 
 TEST_F(TurntableVerb, WritesFramesPreviewsSheetAndStatistics) {
   const ProgramResult result =
@@ -165,90 +110,6 @@ TEST_F(TurntableVerb, AStepMakesTheSameFramesAsTheWhole) {
   EXPECT_EQ(readImage(frame(5)).channel("G").values, whole.channel("G").values);
 }
 
-TEST_F(TurntableVerb, SkipsWholeFramesAndMakesDamagedOnesAgain) {
-  ASSERT_EQ(runProgram(call("--frames 1-6")).exitCode, 0);
-  const Image truth = readImage(frame(2));
-  // 1 stays. 2 loses its end; 3 is damaged in the middle; 4 is empty; 5 is of another size; 6 is not there.
-  fs::resize_file(frame(2), fs::file_size(frame(2)) - 40);
-  {
-    std::fstream file(frame(3), std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp(std::streamoff(fs::file_size(frame(3)) * 2 / 3));
-    file << std::string(200, '\xaa');
-  }
-  fs::resize_file(frame(4), 0);
-  fs::copy_file(frame(1), frame(5), fs::copy_options::overwrite_existing);
-  ASSERT_EQ(runProgram("render " + volume("club.vdb") + " -o '" + frame(5) + "' --size 32x18").exitCode, 0);
-  fs::remove(frame(6));
-  const auto before = fs::last_write_time(frame(1));
-
-  const ProgramResult result =
-      runProgram(call("--frames 1-6 --skip-existing --stats '" + folder.file("s.json") + "'"));
-  ASSERT_EQ(result.exitCode, 0) << result.errors;
-  EXPECT_EQ(fs::last_write_time(frame(1)), before);
-  const auto stats = statistics();
-  for (std::size_t i = 0; i != 6; ++i) EXPECT_EQ(stats["frames"][i]["skipped"], i == 0) << i;
-  for (int number = 1; number <= 6; ++number) {
-    ASSERT_TRUE(isWhole(frame(number))) << number;
-    EXPECT_EQ(readImage(frame(number)).width, 64);
-  }
-  EXPECT_EQ(readImage(frame(2)).channel("G").values, truth.channel("G").values);
-  // Each of them is named; the one that is missing is no surprise.
-  for (int number = 2; number <= 5; ++number)
-    EXPECT_NE(result.errors.find(fs::path(frame(number)).filename().string()), std::string::npos)
-        << result.errors;
-  EXPECT_EQ(result.errors.find("f.0006"), std::string::npos) << result.errors;
-  EXPECT_NE(result.errors.find("32x18 and not 64x36"), std::string::npos) << result.errors;
-  EXPECT_NE(result.errors.find("skipping 1 of 6"), std::string::npos) << result.errors;
-}
-
-TEST_F(TurntableVerb, SkipsWithoutMakingLightAndAddsMissingPreviews) {
-  const std::string preview =
-      " --preview '" + folder.file("v.#.png") + "' --stats '" + folder.file("s.json") + "'";
-  ASSERT_EQ(runProgram(call("--frames 1-3" + preview)).exitCode, 0);
-  const std::string second = textOf(folder.file("v.2.png"));
-  fs::remove(folder.file("v.2.png"));
-  ASSERT_EQ(runProgram(call("--frames 1-3 --skip-existing" + preview)).exitCode, 0);
-  EXPECT_TRUE(isWhole(folder.file("v.2.png")));
-  EXPECT_EQ(statistics()["light_seconds"], 0.0);
-  EXPECT_EQ(statistics()["rays"], 0);
-}
-
-TEST_F(TurntableVerb, SkipsOnlyWhatWasMadeWithTheSameOptionsOfTheSameInput) {
-  const std::string input = folder.file("in.vdb");
-  fs::copy_file(data_->file("club.vdb"), input);
-  const auto skipped = [&](const std::string& options) {
-    const ProgramResult result = runProgram(
-        fmt::format("turntable '{}' -o '{}' --size 16x12 --samples 1 --skip-existing --stats '{}' {}", input,
-                    folder.file("f.####.exr"), folder.file("s.json"), options));
-    EXPECT_EQ(result.exitCode, 0) << result.errors;
-    int count = 0;
-    const auto stats = statistics();
-    for (const auto& entry : stats["frames"]) count += entry["skipped"] == true;
-    if (count == 0 && fs::exists(folder.file("once"))) {
-      EXPECT_NE(result.errors.find("other options"), std::string::npos) << options << result.errors;
-    }
-    std::ofstream(folder.file("once")) << "x";
-    return count;
-  };
-  EXPECT_EQ(skipped("--frames 1-3"), 0);
-  // What says where files go, how many frames are made and by how many threads does not count.
-  EXPECT_EQ(skipped("--frames 1-3 --threads 1 --exposure 1 --preview '" + folder.file("v.#.png") + "'"), 3);
-  EXPECT_EQ(skipped("--frames 1-3x2"), 2);
-  EXPECT_EQ(skipped("--frames 1-3 --only 2"), 1);
-  EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 0);
-  EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 3);
-  // A turn of other frames has them elsewhere.
-  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 0);
-  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 3);
-  // The same file elsewhere is the same; another of its name is not.
-  const std::string other = folder.file("other.vdb");
-  fs::rename(input, other);
-  fs::copy_file(other, input);
-  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 3);
-  fs::copy_file(data_->file("ball.vdb"), input, fs::copy_options::overwrite_existing);
-  EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 0);
-}
-
 TEST_F(TurntableVerb, ObjectsStandBesideTheVolumeInEveryOrbit) {
   std::ofstream(folder.file("wall.obj")) << "v 1 -2 -2\nv 1 2 -2\nv 1 0 2\nf 1 2 3\n";
   const std::string common = " --object '" + folder.file("wall.obj") + "' --ground --backdrop " +
@@ -284,22 +145,6 @@ TEST_F(TurntableVerb, MakesDeepShadowMapsAnewForLightsThatTurn) {
             0);
   for (int number = 2; number <= 4; ++number)
     EXPECT_NEAR(brightness(frame(number)), brightness(frame(1)), 0.03 * brightness(frame(1)));
-}
-
-TEST_F(TurntableVerb, ShardsTogetherMakeAllFrames) {
-  for (int shard = 1; shard <= 3; ++shard) {
-    const ProgramResult result = runProgram(call("--frames 1-7 --shard " + std::to_string(shard) + "/3"));
-    ASSERT_EQ(result.exitCode, 0) << result.errors;
-    // 1 4 7, then 2 5, then 3 6.
-    EXPECT_EQ(files().size(), shard == 1 ? 3u : shard == 2 ? 5u : 7u);
-  }
-  EXPECT_EQ(runProgram(call("--frames 1-2 --shard 3/3")).exitCode, 0);
-  // The end of the work: a call with all frames there.
-  const ProgramResult result =
-      runProgram(call("--frames 1-7 --skip-existing --contact-sheet '" + folder.file("c.png") + "'"));
-  ASSERT_EQ(result.exitCode, 0) << result.errors;
-  EXPECT_NE(result.errors.find("skipping 7 of 7"), std::string::npos) << result.errors;
-  EXPECT_TRUE(isWhole(folder.file("c.png")));
 }
 
 TEST_F(TurntableVerb, MakesAMovieOfAllFrames) {
@@ -362,92 +207,6 @@ TEST_F(TurntableVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
   EXPECT_EQ(result.exitCode, 2);
   EXPECT_NE(result.errors.find("NAME.####.exr"), std::string::npos) << result.errors;
   EXPECT_TRUE(files().empty());
-}
-
-TEST_F(TurntableVerb, FailsAtOnceWhereItCannotWrite) {
-  std::ofstream(folder.file("file")) << "x";
-  const ProgramResult result = runProgram("turntable " + volume("ball.vdb") + " -o '" +
-                                          folder.file("file/f.####.exr") + "' --frames 1-4");
-  EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find("f.0001.exr"), std::string::npos) << result.errors;
-}
-
-TEST_F(TurntableVerb, KeepsEarlierFramesWhenAFileCannotBeWritten) {
-  // A limit on the size of files stands for a full disk: the club seen from its end makes small files, from
-  // its side large ones.
-  ASSERT_EQ(runProgram(call("--frames 1-8 --view 180,0 --aov none")).exitCode, 0);
-  std::vector<std::uintmax_t> sizes;
-  for (int i = 1; i <= 8; ++i) sizes.push_back(fs::file_size(frame(i)));
-  // In units of 512 bytes: enough for the first frame.
-  const std::uintmax_t limit = sizes[0] / 512 + 1;
-  int first = 0;
-  while (first != 8 && sizes[std::size_t(first)] <= limit * 512) ++first;
-  ASSERT_LT(first, 8) << "all frames have the same size";
-  for (int i = 1; i <= 8; ++i) fs::remove(frame(i));
-  const ProgramResult result =
-      runProgram(call("--frames 1-8 --view 180,0 --aov none"), "ulimit -f " + std::to_string(limit) + ";");
-  EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find(fs::path(frame(first + 1)).filename().string()), std::string::npos)
-      << result.errors;
-  EXPECT_EQ(int(files().size()), first);
-  for (int i = 1; i <= first; ++i) EXPECT_TRUE(isWhole(frame(i)));
-}
-
-TEST_F(TurntableVerb, EndsCleanlyOnSignalsAndResumes) {
-  for (const auto& [signal, code] : {std::pair{"INT", 130}, {"TERM", 143}, {"KILL", 137}}) {
-    // Sent once the second frame is there; the whole would take minutes.
-    std::ofstream(folder.file("script"))
-        << "'" << programPath() << "' " << call("--frames 1-2000", "club.vdb", 64) << " 2>'"
-        << folder.file("err") << "' >/dev/null &\nid=$!\nwhile [ ! -e '" << frame(2)
-        << "' ] && kill -0 $id; do sleep 0.02; done\nkill -" << signal << " $id\nwait $id\n";
-    const int status = std::system(("sh '" + folder.file("script") + "' 2>/dev/null").c_str());
-    fs::remove(folder.file("script"));
-    EXPECT_EQ(WEXITSTATUS(status), code) << signal;
-    if (code != 137) {
-      EXPECT_NE(textOf(folder.file("err")).find("--skip-existing makes the rest"), std::string::npos)
-          << textOf(folder.file("err"));
-    }
-    fs::remove(folder.file("err"));
-    int count = 0;
-    for (const std::string& name : files()) {
-      // Killed without a chance, it may leave the hidden file that it was writing.
-      if (code == 137 && name.starts_with('.')) continue;
-      EXPECT_TRUE(isWhole(folder.file(name))) << name;
-      ++count;
-    }
-    EXPECT_GE(count, 2);
-
-    const ProgramResult rest =
-        runProgram(call("--frames 1-2000 --skip-existing --only 1-" + std::to_string(count + 2) +
-                            " --stats '" + folder.file("s.json") + "'",
-                        "club.vdb", 64));
-    EXPECT_EQ(rest.exitCode, 0) << rest.errors;
-    int skipped = 0;
-    const auto stats = statistics();
-    for (const auto& entry : stats["frames"]) skipped += entry["skipped"] == true;
-    EXPECT_EQ(skipped, count);
-    for (int i = 1; i <= count + 2; ++i) {
-      EXPECT_TRUE(isWhole(frame(i)));
-      fs::remove(frame(i));
-    }
-    fs::remove(folder.file("s.json"));
-  }
-}
-
-TEST_F(TurntableVerb, TellsFarmsHowFarItIs) {
-  const ProgramResult result = runProgram(call("--frames 1-40 --progress alf", "club.vdb", 16));
-  ASSERT_EQ(result.exitCode, 0) << result.errors;
-  std::istringstream lines(result.output);
-  int last = -1, count = 0;
-  for (std::string line; std::getline(lines, line);) {
-    int percent = 0;
-    if (std::sscanf(line.c_str(), "ALF_PROGRESS %d%%", &percent) != 1) continue;
-    EXPECT_GT(percent, last);
-    last = percent;
-    ++count;
-  }
-  EXPECT_EQ(last, 100);
-  EXPECT_GE(count, 2);
 }
 
 TEST_F(TurntableVerb, MakesTheSameFramesAtAnyNumberOfThreads) {

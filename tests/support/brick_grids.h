@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -40,6 +42,33 @@ inline float scatter(const Vec3i& v) {
       std::uint32_t(v.x) * 73856093u ^ std::uint32_t(v.y) * 19349663u ^ std::uint32_t(v.z) * 83492791u;
   h = (h ^ h >> 13) * 0x5bd1e995u;
   return float((h ^ h >> 15) & 0xffff) / 32767.5f - 1.0f;
+}
+
+/// Small lattices of random samples, many of them 0 and next to each other.
+inline std::shared_ptr<BrickGrid> randomLattice(std::uint32_t seed, int side) {
+  std::mt19937 random(seed);
+  const std::uint32_t kind = seed % 4;
+  std::vector<float> values(std::size_t(side * side * side));
+  for (float& v : values)
+    v = kind == 0   ? float(random() % 3) - 1
+        : kind == 1 ? float(random() % 2001) / 1000.0f - 1
+        : kind == 2 ? (random() % 3 != 0 ? 1.0f : 0.0f)
+                    : (float(random() % 5) - 2) / 2;
+  return denseGrid(
+      {-1, 0, 0}, {2, 2, 1},
+      [&](const Vec3i& v) {
+        const Vec3i at = v - Vec3i{-2, 5, 1};
+        const bool isIn = std::min({at.x, at.y, at.z}) >= 0 && std::max({at.x, at.y, at.z}) < side;
+        return isIn ? values[std::size_t((at.z * side + at.y) * side + at.x)] : -1.0f;
+      },
+      {}, -1.0f);
+}
+
+/// Whether two grids hold the same bricks in the same places, bit for bit.
+inline bool sameGrid(const BrickGrid& a, const BrickGrid& b) {
+  return a.firstBrick() == b.firstBrick() && a.brickCount() == b.brickCount() && a.table() == b.table() &&
+         a.values().size() == b.values().size() &&
+         std::memcmp(a.values().data(), b.values().data(), a.values().size() * sizeof(float)) == 0;
 }
 
 /// radius - |x - center| with its exact range, as a user's function that counts how often it is called.

@@ -73,6 +73,11 @@ inline Mesh boxMesh(const Vec3d& low, const Vec3d& high) {
   return mesh;
 }
 
+/// The cube of edge 2 about the origin.
+inline Mesh cube() {
+  return boxMesh({-1, -1, -1}, {1, 1, 1});
+}
+
 /// Both surfaces as one mesh.
 inline Mesh joined(Mesh a, const Mesh& b) {
   const auto offset = std::uint32_t(a.positions.size());

@@ -2,8 +2,8 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <random>
 
@@ -16,6 +16,7 @@
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/shape/shapes.h"
+#include "tests/levelset/cut/balls_and_blades.h"
 #include "tests/support/brick_grids.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/piece_checks.h"
@@ -24,112 +25,12 @@
 namespace nephele::test {
 namespace {
 
-constexpr Box kBall{{-1, -1, -1}, {1, 1, 1}};
-
-/// The ball of radius 1 with so many voxels along it.
-std::shared_ptr<BrickGrid> ball(int voxelsPerRadius) {
-  const float h = 1.0f / float(voxelsPerRadius);
-  return bakeGrid(sphere({0, 0, 0}, 1),
-                  {.voxelSize = h, .box = kBall.expanded(4 * h), .band = {-4 * h, 4 * h}});
-}
-
-/// Small lattices of random samples, many of them 0 and next to each other.
-std::shared_ptr<BrickGrid> randomLattice(std::uint32_t seed, int side) {
-  std::mt19937 random(seed);
-  const std::uint32_t kind = seed % 4;
-  std::vector<float> values(std::size_t(side * side * side));
-  for (float& v : values)
-    v = kind == 0   ? float(random() % 3) - 1
-        : kind == 1 ? float(random() % 2001) / 1000.0f - 1
-        : kind == 2 ? (random() % 3 != 0 ? 1.0f : 0.0f)
-                    : (float(random() % 5) - 2) / 2;
-  return denseGrid(
-      {-1, 0, 0}, {2, 2, 1},
-      [&](const Vec3i& v) {
-        const Vec3i at = v - Vec3i{-2, 5, 1};
-        const bool isIn = std::min({at.x, at.y, at.z}) >= 0 && std::max({at.x, at.y, at.z}) < side;
-        return isIn ? values[std::size_t((at.z * side + at.y) * side + at.x)] : -1.0f;
-      },
-      {}, -1.0f);
-}
-
 /// How far a point is from the nearest of some planes.
 double toPlanes(const Vec3d& p, const std::vector<BladePlane>& planes) {
   double least = std::numeric_limits<double>::infinity();
   for (const BladePlane& plane : planes)
     least = std::min(least, std::abs(dot(p - Vec3d(plane.point), normalize(Vec3d(plane.normal)))));
   return least;
-}
-
-TEST(MarchingTetrahedra, AreClosedManifoldsOnAnySamples) {
-  for (std::uint32_t seed = 0; seed < 400; ++seed) {
-    const Mesh mesh = marchingTetrahedra(*randomLattice(seed, 3 + int(seed / 4 % 4)));
-    if (mesh.faceCount() == 0) continue;
-    const Topology topology = topologyOf(mesh);
-    ASSERT_TRUE(topology.isClosedManifold()) << "seed " << seed << ": " << topology;
-    ASSERT_GT(signedVolume(mesh), 0) << seed;
-  }
-}
-
-TEST(MarchingTetrahedra, DoNotCrossThemselves) {
-  for (std::uint32_t seed = 0; seed < 12; ++seed)
-    EXPECT_EQ(countSelfIntersections(marchingTetrahedra(*randomLattice(seed, 5))), 0u) << seed;
-}
-
-TEST(MarchingTetrahedra, OfABallGainTheFourthOfTheErrorAtHalfTheVoxel) {
-  const double exact = 4 * M_PI / 3;
-  const double coarse = signedVolume(marchingTetrahedra(*ball(10))) / exact - 1;
-  const double fine = signedVolume(marchingTetrahedra(*ball(20))) / exact - 1;
-  EXPECT_LT(std::abs(fine), 0.005);
-  EXPECT_NEAR(coarse / fine, 4, 0.4);  // linear in cells: second order
-}
-
-TEST(MarchingTetrahedra, PassThroughSamplesOfZero) {
-  // A cube whose faces are samples: these become vertices, with no slivers beside them.
-  const auto cube = denseGrid(
-      {-1, -1, -1}, {2, 2, 2},
-      [](const Vec3i& v) {
-        return 5.0f - float(std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
-      },
-      {}, -1.0f);
-  const Mesh mesh = marchingTetrahedra(*cube);
-  EXPECT_TRUE(topologyOf(mesh).isClosedManifold()) << topologyOf(mesh);
-  // 602 samples on the surface of 10 x 10 x 10 cells, but six of its edges, 9 samples each, and six corners
-  // have no edge of a tetrahedron that leads inside.
-  EXPECT_EQ(mesh.positions.size(), 602u - 6u * 9u - 6u);
-  for (const Vec3d& p : mesh.positions) {
-    EXPECT_EQ(p, Vec3d(std::round(p.x), std::round(p.y), std::round(p.z)));
-    EXPECT_EQ(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}), 5);
-  }
-}
-
-TEST(MarchingTetrahedra, StandWhereTheMapOfTheGridPutsThem) {
-  // Turned, stretched and mirrored.
-  Affine map;
-  map.linear.m = {0, 0.5f, 0, 0.25f, 0, 0, 0, 0, 2};
-  map.translation = {10, 20, 30};
-  const auto value = [](const Vec3i& v) { return 5.3f - length(Vec3f(v)); };
-  const Mesh plain = marchingTetrahedra(*denseGrid({-1, -1, -1}, {2, 2, 2}, value, {}, -1.0f));
-  const Mesh mapped = marchingTetrahedra(*denseGrid({-1, -1, -1}, {2, 2, 2}, value, map, -1.0f));
-  EXPECT_TRUE(topologyOf(mapped).isClosedManifold());
-  EXPECT_NEAR(signedVolume(mapped) / signedVolume(plain), 0.25, 1e-9);
-  EXPECT_NEAR(length(Vec3d(boundingBox(mapped).center()) - Vec3d{10, 20, 30}), 0, 1e-4);
-}
-
-TEST(MarchingTetrahedra, RefuseWhatHasNoSurface) {
-  EXPECT_THROW(marchingTetrahedra(*denseGrid(
-                   {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return 1; }, {}, 1.0f)),
-               Error);
-  EXPECT_THROW(
-      marchingTetrahedra(*denseGrid(
-          {0, 0, 0}, {1, 1, 1},
-          [](const Vec3i& v) { return v.x == 3 ? std::numeric_limits<float>::quiet_NaN() : float(4 - v.y); },
-          {}, -1.0f)),
-      Error);
-  const auto outside = denseGrid(
-      {0, 0, 0}, {1, 1, 1}, [](const Vec3i&) { return -1; }, {}, -1.0f);
-  EXPECT_EQ(marchingTetrahedra(*outside).faceCount(), 0u);
-  EXPECT_THROW(cutIntoMeshes(*outside, {}), Error);
 }
 
 TEST(LevelSetPieces, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {

@@ -3,12 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 
 #include "nephele/levelset/mesh/mesh_repair.h"
+#include "tests/levelset/io/mesh_attributes.h"
 #include "tests/support/known_meshes.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
@@ -16,16 +17,11 @@
 namespace nephele {
 namespace {
 
+using test::find;
 using test::KnownMesh;
 using test::ownData;
 using test::sharedData;
 using test::TemporaryFolder;
-
-const MeshAttribute* find(const Mesh& mesh, const std::string& name) {
-  for (const MeshAttribute& attribute : mesh.attributes)
-    if (attribute.name == name) return &attribute;
-  return nullptr;
-}
 
 Mesh readText(const std::string& name, const std::string& text) {
   const TemporaryFolder folder;
@@ -46,8 +42,6 @@ std::string bigEndianFloats(const std::vector<float>& values) {
   }
   return bytes;
 }
-
-// ---- real files ----
 
 class KnownMeshes : public ::testing::TestWithParam<KnownMesh> {};
 
@@ -139,8 +133,6 @@ TEST(MeshIo, UnusualButValidFilesAreRead) {
   }
 }
 
-// ---- OBJ ----
-
 TEST(MeshIo, ObjTakesEveryFormOfACorner) {
   const Mesh mesh =
       readText("a.obj",
@@ -181,8 +173,6 @@ TEST(MeshIo, ObjReadsTinyAndHugeNumbers) {
   EXPECT_EQ(mesh.positions[0].x, 0);
   EXPECT_EQ(mesh.positions[0].z, 1e300);
 }
-
-// ---- PLY ----
 
 constexpr const char* kTriangleElements =
     "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -238,7 +228,41 @@ TEST(MeshIo, PlyStripsAlternateAndRestart) {
   EXPECT_EQ(mesh.corners, (std::vector<std::uint32_t>{0, 1, 2, 2, 1, 3}));
 }
 
-// ---- STL and OFF ----
+TEST(MeshIo, TextPlyHasAttributesOfCornersToo) {
+  const Mesh mesh = readText(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element face 2\nproperty list uchar float heat\nproperty list uchar int vertex_indices\n"
+      "property list uchar double color\nproperty list uchar float texcoord\n"
+      "property list int int neighbours\nend_header\n"
+      "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
+      "3 1 2 3 3 0 1 2 9 0 0 0 .5 .5 .5 1 1 1 6 0 0 1 0 0 1 3 7 8 9\n"
+      "3 4 5 6 3 2 1 0 9 1 0 0 0 1 0 0 0 1 6 1 1 0 1 1 0 3 7 8 9\n");
+  EXPECT_EQ(mesh.attributes.size(), 4u) << "lists of whole numbers are none";
+  EXPECT_EQ(find(mesh, "heat")->values, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(find(mesh, "uv")->width, 2);
+  EXPECT_EQ(find(mesh, "color")->domain, MeshAttribute::Domain::vertex) << "they have the name";
+  EXPECT_EQ(find(mesh, "color_corner")->values,
+            (std::vector<float>{0, 0, 0, .5f, .5f, .5f, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
+TEST(MeshIo, PlyListsThatDoNotBelongToCornersArePassedOver) {
+  const auto readWith = [](const char* header, const char* first, const char* second) {
+    return readText("a.ply", std::string("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                                         "property float y\nproperty float z\nelement face 2\n"
+                                         "property list uchar int vertex_indices\nproperty ") +
+                                 header + "\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 " + first +
+                                 "\n4 0 1 3 2 " + second + "\n");
+  };
+  EXPECT_EQ(readWith("list uchar float a", "3 1 2 3", "4 1 2 3 4").attributes.size(), 1u);
+  // Not the same number for each corner; missing at a face; no multiple of the corners.
+  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "8 1 2 3 4 5 6 7 8").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "0", "4 1 2 3 4").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "0").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "2 1 2", "2 1 2").attributes.empty());
+  EXPECT_TRUE(readWith("list uchar float a", "0", "0").attributes.empty());
+}
 
 std::string binaryStl(const std::string& header, const std::vector<float>& facets) {
   std::string bytes = header + std::string(80 - header.size(), ' ');
@@ -276,8 +300,6 @@ TEST(MeshIo, OffKnowsColoursNormalsCommentsAndCountsBehindTheWord) {
   EXPECT_EQ(mesh.corners, (std::vector<std::uint32_t>{0, 1, 2}));
   EXPECT_EQ(find(mesh, "color")->values, (std::vector<float>{1, 0, 0, 0, 0.2f, 0, 0, 0, 0}));
 }
-
-// ---- glTF ----
 
 TEST(MeshIo, GltfAppliesNodesFlipsVAndTurnsMirroredFaces) {
   // One triangle (0,0,0) (1,0,0) (0,1,0) with coordinates (0,0) (1,0) (0,0.25) in a base64 buffer, under a
@@ -328,187 +350,6 @@ TEST(MeshIo, PaintedMeshOfThisProjectHasItsAttributes) {
     const double t = std::clamp((h - 0.1) / 0.5, 0.0, 1.0);
     ASSERT_NEAR(amplitude->values[v], t * t * (3 - 2 * t), 1e-5);
   }
-}
-
-// ---- writing ----
-
-Mesh decorated() {
-  Mesh mesh;
-  mesh.positions = {{0, 0, 0}, {0.1, 0, 0}, {0, 1.0 / 3, 0}, {0, 0, 1e-7}, {0.5, 0.5, 0.5}};
-  mesh.addFace(std::vector<std::uint32_t>{0, 1, 2});
-  mesh.addFace(std::vector<std::uint32_t>{0, 2, 4, 3});
-  mesh.addFace(std::vector<std::uint32_t>{3, 1, 0});
-  mesh.groups = {{"piece_0000", 0, 2}, {"piece_0001", 2, 1}};
-  mesh.attributes.push_back({"uv", MeshAttribute::Domain::corner, 2, {}});
-  for (int c = 0; c < 10; ++c)
-    mesh.attributes[0].values.insert(mesh.attributes[0].values.end(), {c * 0.1f, 1 - c * 0.1f});
-  mesh.attributes.push_back(
-      {"color", MeshAttribute::Domain::vertex, 3, {0, 1, 0.2f, 1, 0, 0, 1, 1, 1, 0, 0, 0, 0.4f, 0.6f, 0.8f}});
-  mesh.attributes.push_back({"mass", MeshAttribute::Domain::vertex, 1, {1, 2, 3, 4, 5}});
-  return mesh;
-}
-
-TEST(MeshIo, ObjRoundTripKeepsEverythingItCanHold) {
-  const TemporaryFolder folder;
-  const Mesh mesh = decorated();
-  writeMesh(folder.file("a.obj"), mesh);
-  const Mesh back = readMesh(folder.file("a.obj"));
-  EXPECT_EQ(back.positions, mesh.positions);
-  EXPECT_EQ(back.corners, mesh.corners);
-  EXPECT_EQ(back.faceStart, mesh.faceStart);
-  EXPECT_EQ(find(back, "uv")->values, mesh.attributes[0].values);
-  EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values);
-  ASSERT_EQ(back.groups.size(), 2u);
-  EXPECT_EQ(back.groups[1].name, "piece_0001");
-  EXPECT_EQ(back.groups[1].firstFace, 2u);
-}
-
-TEST(MeshIo, PlyRoundTripKeepsPolygonsAttributesAndDigits) {
-  const TemporaryFolder folder;
-  const Mesh mesh = decorated();
-  writeMesh(folder.file("a.ply"), mesh);
-  const Mesh back = readMesh(folder.file("a.ply"));
-  EXPECT_EQ(back.positions, mesh.positions) << "positions that no float holds are written as doubles";
-  EXPECT_EQ(back.corners, mesh.corners);
-  EXPECT_EQ(back.faceStart, mesh.faceStart);
-  EXPECT_EQ(find(back, "uv")->values, mesh.attributes[0].values);
-  EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values) << "multiples of 1/255 survive";
-  EXPECT_EQ(find(back, "mass")->values, mesh.attributes[2].values);
-}
-
-// Corner c has 10 c, 10 c + 1, ... per attribute, which no two corners share.
-Mesh withCornerAttributes() {
-  Mesh mesh = decorated();
-  for (const auto& [name, width] :
-       {std::pair{"uv1", 2}, std::pair{"color_corner", 3}, std::pair{"heat", 1}, std::pair{"flow", 5}}) {
-    MeshAttribute attribute{name, MeshAttribute::Domain::corner, width, {}};
-    for (std::size_t c = 0; c < mesh.corners.size(); ++c)
-      for (int k = 0; k < width; ++k) attribute.values.push_back(float(10 * c) + float(k) + 0.1f);
-    mesh.attributes.push_back(std::move(attribute));
-  }
-  return mesh;
-}
-
-TEST(MeshIo, PlyRoundTripKeepsEveryAttributeOfCorners) {
-  const TemporaryFolder folder;
-  const Mesh mesh = withCornerAttributes();
-  writeMesh(folder.file("a.ply"), mesh);
-  const Mesh back = readMesh(folder.file("a.ply"));
-  EXPECT_EQ(back.attributes.size(), mesh.attributes.size());
-  for (const MeshAttribute& a : mesh.attributes) {
-    const MeshAttribute* b = find(back, a.name);
-    ASSERT_NE(b, nullptr) << a.name;
-    EXPECT_EQ(b->domain, a.domain) << a.name;
-    EXPECT_EQ(b->width, a.width) << a.name;
-    EXPECT_EQ(b->values, a.values) << a.name;
-  }
-}
-
-TEST(MeshIo, PlyHasColoursOfCornersAsMeshLabHasThem) {
-  // As VCGlib's importer and exporter do: a list "color" of three floats per corner; opacity beside it.
-  const TemporaryFolder folder;
-  Mesh mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (const auto& f : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}}) mesh.addFace(f);
-  for (const int width : {3, 4}) {
-    MeshAttribute color{"color", MeshAttribute::Domain::corner, width, {}};
-    for (int i = 0; i < 6 * width; ++i) color.values.push_back(float(i) / 24);
-    mesh.attributes = {color};
-    writeMesh(folder.file("a.ply"), mesh);
-    const std::string text = test::textOf(folder.file("a.ply"));
-    EXPECT_NE(text.find("property list uchar float color\n"), std::string::npos);
-    EXPECT_EQ(text.find("property list uchar float alpha\n") != std::string::npos, width == 4);
-    const Mesh back = readMesh(folder.file("a.ply"));
-    ASSERT_EQ(back.attributes.size(), 1u);
-    EXPECT_EQ(back.attributes[0].name, "color");
-    EXPECT_EQ(back.attributes[0].width, width);
-    EXPECT_EQ(back.attributes[0].values, color.values);
-  }
-}
-
-TEST(MeshIo, TextPlyHasAttributesOfCornersToo) {
-  const Mesh mesh = readText(
-      "a.ply",
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-      "element face 2\nproperty list uchar float heat\nproperty list uchar int vertex_indices\n"
-      "property list uchar double color\nproperty list uchar float texcoord\n"
-      "property list int int neighbours\nend_header\n"
-      "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
-      "3 1 2 3 3 0 1 2 9 0 0 0 .5 .5 .5 1 1 1 6 0 0 1 0 0 1 3 7 8 9\n"
-      "3 4 5 6 3 2 1 0 9 1 0 0 0 1 0 0 0 1 6 1 1 0 1 1 0 3 7 8 9\n");
-  EXPECT_EQ(mesh.attributes.size(), 4u) << "lists of whole numbers are none";
-  EXPECT_EQ(find(mesh, "heat")->values, (std::vector<float>{1, 2, 3, 4, 5, 6}));
-  EXPECT_EQ(find(mesh, "uv")->width, 2);
-  EXPECT_EQ(find(mesh, "color")->domain, MeshAttribute::Domain::vertex) << "they have the name";
-  EXPECT_EQ(find(mesh, "color_corner")->values,
-            (std::vector<float>{0, 0, 0, .5f, .5f, .5f, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
-}
-
-TEST(MeshIo, PlyListsThatDoNotBelongToCornersArePassedOver) {
-  const auto readWith = [](const char* header, const char* first, const char* second) {
-    return readText("a.ply", std::string("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
-                                         "property float y\nproperty float z\nelement face 2\n"
-                                         "property list uchar int vertex_indices\nproperty ") +
-                                 header + "\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 " + first +
-                                 "\n4 0 1 3 2 " + second + "\n");
-  };
-  EXPECT_EQ(readWith("list uchar float a", "3 1 2 3", "4 1 2 3 4").attributes.size(), 1u);
-  // Not the same number for each corner; missing at a face; no multiple of the corners.
-  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "8 1 2 3 4 5 6 7 8").attributes.empty());
-  EXPECT_TRUE(readWith("list uchar float a", "0", "4 1 2 3 4").attributes.empty());
-  EXPECT_TRUE(readWith("list uchar float a", "3 1 2 3", "0").attributes.empty());
-  EXPECT_TRUE(readWith("list uchar float a", "2 1 2", "2 1 2").attributes.empty());
-  EXPECT_TRUE(readWith("list uchar float a", "0", "0").attributes.empty());
-}
-
-TEST(MeshIo, PlyPutsTextureCoordinatesOnVerticesWhereTheyAgree) {
-  const TemporaryFolder folder;
-  Mesh mesh = decorated();
-  for (std::size_t c = 0; c < mesh.corners.size(); ++c)
-    for (std::size_t k = 0; k < 2; ++k) mesh.attributes[0].values[2 * c + k] = float(mesh.corners[c] + k);
-  writeMesh(folder.file("a.ply"), mesh);
-  EXPECT_NE(test::textOf(folder.file("a.ply")).find("property float s\nproperty float t\n"),
-            std::string::npos);
-  EXPECT_EQ(find(readMesh(folder.file("a.ply")), "uv")->values, mesh.attributes[0].values);
-}
-
-TEST(MeshIo, PlyHoldsPolygonsOfMoreThan255Corners) {
-  const TemporaryFolder folder;
-  Mesh mesh;
-  std::vector<std::uint32_t> loop;
-  for (std::uint32_t i = 0; i < 300; ++i) {
-    mesh.positions.emplace_back(std::cos(i * 0.02), std::sin(i * 0.02), 0);
-    loop.push_back(i);
-  }
-  mesh.addFace(loop);
-  MeshAttribute weight{"weight", MeshAttribute::Domain::corner, 1, std::vector<float>(300)};
-  for (std::size_t c = 0; c < 300; ++c) weight.values[c] = float(c);
-  mesh.attributes.push_back(weight);
-  writeMesh(folder.file("a.ply"), mesh);
-  const Mesh back = readMesh(folder.file("a.ply"));
-  EXPECT_EQ(back.corners, mesh.corners);
-  ASSERT_EQ(back.attributes.size(), 1u);
-  EXPECT_EQ(back.attributes[0].values, weight.values);
-}
-
-TEST(MeshIo, StlRoundTripIsTheTriangulationInFloats) {
-  const TemporaryFolder folder;
-  const Mesh mesh = decorated();
-  writeMesh(folder.file("a.stl"), mesh);
-  const Mesh back = readMesh(folder.file("a.stl"));
-  EXPECT_EQ(back.faceCount(), 4u);
-  EXPECT_EQ(back.positions.size(), mesh.positions.size());
-  EXPECT_NEAR(surfaceArea(back), surfaceArea(mesh), 1e-7);
-}
-
-TEST(MeshIo, WritingFloatsAsTextAndBackGivesTheSameFloats) {
-  const TemporaryFolder folder;
-  Mesh mesh;
-  mesh.positions = {{double(0.1f), double(1.0f / 3), double(1e-30f)}, {1, 0, 0}, {0, 1, 0}};
-  mesh.addFace(std::vector<std::uint32_t>{0, 1, 2});
-  writeMesh(folder.file("a.obj"), mesh);
-  EXPECT_EQ(Vec3f(readMesh(folder.file("a.obj")).positions[0]), Vec3f(0.1f, 1.0f / 3, 1e-30f));
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include "nephele/levelset/cloud/layers_on_grids.h"
+
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -6,7 +8,6 @@
 #include <random>
 
 #include "nephele/levelset/cloud/cloud_density.h"
-#include "nephele/levelset/cloud/layers_on_grids.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"

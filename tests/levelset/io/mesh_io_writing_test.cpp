@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "tests/levelset/io/mesh_attributes.h"
+#include "tests/support/run_program.h"
+
+namespace nephele {
+namespace {
+
+using test::find;
+using test::TemporaryFolder;
+
+Mesh decorated() {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {0.1, 0, 0}, {0, 1.0 / 3, 0}, {0, 0, 1e-7}, {0.5, 0.5, 0.5}};
+  mesh.addFace(std::vector<std::uint32_t>{0, 1, 2});
+  mesh.addFace(std::vector<std::uint32_t>{0, 2, 4, 3});
+  mesh.addFace(std::vector<std::uint32_t>{3, 1, 0});
+  mesh.groups = {{"piece_0000", 0, 2}, {"piece_0001", 2, 1}};
+  mesh.attributes.push_back({"uv", MeshAttribute::Domain::corner, 2, {}});
+  for (int c = 0; c < 10; ++c)
+    mesh.attributes[0].values.insert(mesh.attributes[0].values.end(), {c * 0.1f, 1 - c * 0.1f});
+  mesh.attributes.push_back(
+      {"color", MeshAttribute::Domain::vertex, 3, {0, 1, 0.2f, 1, 0, 0, 1, 1, 1, 0, 0, 0, 0.4f, 0.6f, 0.8f}});
+  mesh.attributes.push_back({"mass", MeshAttribute::Domain::vertex, 1, {1, 2, 3, 4, 5}});
+  return mesh;
+}
+
+TEST(MeshIo, ObjRoundTripKeepsEverythingItCanHold) {
+  const TemporaryFolder folder;
+  const Mesh mesh = decorated();
+  writeMesh(folder.file("a.obj"), mesh);
+  const Mesh back = readMesh(folder.file("a.obj"));
+  EXPECT_EQ(back.positions, mesh.positions);
+  EXPECT_EQ(back.corners, mesh.corners);
+  EXPECT_EQ(back.faceStart, mesh.faceStart);
+  EXPECT_EQ(find(back, "uv")->values, mesh.attributes[0].values);
+  EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values);
+  ASSERT_EQ(back.groups.size(), 2u);
+  EXPECT_EQ(back.groups[1].name, "piece_0001");
+  EXPECT_EQ(back.groups[1].firstFace, 2u);
+}
+
+TEST(MeshIo, PlyRoundTripKeepsPolygonsAttributesAndDigits) {
+  const TemporaryFolder folder;
+  const Mesh mesh = decorated();
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.positions, mesh.positions) << "positions that no float holds are written as doubles";
+  EXPECT_EQ(back.corners, mesh.corners);
+  EXPECT_EQ(back.faceStart, mesh.faceStart);
+  EXPECT_EQ(find(back, "uv")->values, mesh.attributes[0].values);
+  EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values) << "multiples of 1/255 survive";
+  EXPECT_EQ(find(back, "mass")->values, mesh.attributes[2].values);
+}
+
+// Corner c has 10 c, 10 c + 1, ... per attribute, which no two corners share.
+Mesh withCornerAttributes() {
+  Mesh mesh = decorated();
+  for (const auto& [name, width] :
+       {std::pair{"uv1", 2}, std::pair{"color_corner", 3}, std::pair{"heat", 1}, std::pair{"flow", 5}}) {
+    MeshAttribute attribute{name, MeshAttribute::Domain::corner, width, {}};
+    for (std::size_t c = 0; c < mesh.corners.size(); ++c)
+      for (int k = 0; k < width; ++k) attribute.values.push_back(float(10 * c) + float(k) + 0.1f);
+    mesh.attributes.push_back(std::move(attribute));
+  }
+  return mesh;
+}
+
+TEST(MeshIo, PlyRoundTripKeepsEveryAttributeOfCorners) {
+  const TemporaryFolder folder;
+  const Mesh mesh = withCornerAttributes();
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.attributes.size(), mesh.attributes.size());
+  for (const MeshAttribute& a : mesh.attributes) {
+    const MeshAttribute* b = find(back, a.name);
+    ASSERT_NE(b, nullptr) << a.name;
+    EXPECT_EQ(b->domain, a.domain) << a.name;
+    EXPECT_EQ(b->width, a.width) << a.name;
+    EXPECT_EQ(b->values, a.values) << a.name;
+  }
+}
+
+TEST(MeshIo, PlyHasColoursOfCornersAsMeshLabHasThem) {
+  // As VCGlib's importer and exporter do: a list "color" of three floats per corner; opacity beside it.
+  const TemporaryFolder folder;
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const auto& f : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}}) mesh.addFace(f);
+  for (const int width : {3, 4}) {
+    MeshAttribute color{"color", MeshAttribute::Domain::corner, width, {}};
+    for (int i = 0; i < 6 * width; ++i) color.values.push_back(float(i) / 24);
+    mesh.attributes = {color};
+    writeMesh(folder.file("a.ply"), mesh);
+    const std::string text = test::textOf(folder.file("a.ply"));
+    EXPECT_NE(text.find("property list uchar float color\n"), std::string::npos);
+    EXPECT_EQ(text.find("property list uchar float alpha\n") != std::string::npos, width == 4);
+    const Mesh back = readMesh(folder.file("a.ply"));
+    ASSERT_EQ(back.attributes.size(), 1u);
+    EXPECT_EQ(back.attributes[0].name, "color");
+    EXPECT_EQ(back.attributes[0].width, width);
+    EXPECT_EQ(back.attributes[0].values, color.values);
+  }
+}
+
+TEST(MeshIo, PlyPutsTextureCoordinatesOnVerticesWhereTheyAgree) {
+  const TemporaryFolder folder;
+  Mesh mesh = decorated();
+  for (std::size_t c = 0; c < mesh.corners.size(); ++c)
+    for (std::size_t k = 0; k < 2; ++k) mesh.attributes[0].values[2 * c + k] = float(mesh.corners[c] + k);
+  writeMesh(folder.file("a.ply"), mesh);
+  EXPECT_NE(test::textOf(folder.file("a.ply")).find("property float s\nproperty float t\n"),
+            std::string::npos);
+  EXPECT_EQ(find(readMesh(folder.file("a.ply")), "uv")->values, mesh.attributes[0].values);
+}
+
+TEST(MeshIo, PlyHoldsPolygonsOfMoreThan255Corners) {
+  const TemporaryFolder folder;
+  Mesh mesh;
+  std::vector<std::uint32_t> loop;
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    mesh.positions.emplace_back(std::cos(i * 0.02), std::sin(i * 0.02), 0);
+    loop.push_back(i);
+  }
+  mesh.addFace(loop);
+  MeshAttribute weight{"weight", MeshAttribute::Domain::corner, 1, std::vector<float>(300)};
+  for (std::size_t c = 0; c < 300; ++c) weight.values[c] = float(c);
+  mesh.attributes.push_back(weight);
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.corners, mesh.corners);
+  ASSERT_EQ(back.attributes.size(), 1u);
+  EXPECT_EQ(back.attributes[0].values, weight.values);
+}
+
+TEST(MeshIo, StlRoundTripIsTheTriangulationInFloats) {
+  const TemporaryFolder folder;
+  const Mesh mesh = decorated();
+  writeMesh(folder.file("a.stl"), mesh);
+  const Mesh back = readMesh(folder.file("a.stl"));
+  EXPECT_EQ(back.faceCount(), 4u);
+  EXPECT_EQ(back.positions.size(), mesh.positions.size());
+  EXPECT_NEAR(surfaceArea(back), surfaceArea(mesh), 1e-7);
+}
+
+TEST(MeshIo, WritingFloatsAsTextAndBackGivesTheSameFloats) {
+  const TemporaryFolder folder;
+  Mesh mesh;
+  mesh.positions = {{double(0.1f), double(1.0f / 3), double(1e-30f)}, {1, 0, 0}, {0, 1, 0}};
+  mesh.addFace(std::vector<std::uint32_t>{0, 1, 2});
+  writeMesh(folder.file("a.obj"), mesh);
+  EXPECT_EQ(Vec3f(readMesh(folder.file("a.obj")).positions[0]), Vec3f(0.1f, 1.0f / 3, 1e-30f));
+}
+
+}  // namespace
+}  // namespace nephele
