@@ -8,7 +8,7 @@
 #include <string>
 
 #include "nephele/levelset/cut/cut.h"
-#include "nephele/modeling/base/error.h"
+#include "tests/support/mesh_attributes.h"
 #include "tests/support/mesh_topology.h"
 
 namespace nephele::test {
@@ -35,13 +35,6 @@ inline double insideArea(const Mesh& mesh) {
   double area = 0;
   for (std::size_t f = firstInside(mesh); f < mesh.faceCount(); ++f) area += faceArea(mesh, f);
   return area;
-}
-
-inline const MeshAttribute& attributeOf(const Mesh& mesh, const std::string& name) {
-  const auto found = std::find_if(mesh.attributes.begin(), mesh.attributes.end(),
-                                  [&](const MeshAttribute& a) { return a.name == name; });
-  if (found == mesh.attributes.end()) throw Error("no attribute " + name);
-  return *found;
 }
 
 /// Closed manifold pieces facing outwards, of the volume of the source together, whose inner faces each lie

@@ -5,25 +5,14 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "nephele/modeling/base/mesh.h"
+#include "tests/support/mesh_attributes.h"
 
 namespace nephele::test {
-
-inline const MeshAttribute& attributeOf(const Mesh& mesh, const std::string& name) {
-  for (const MeshAttribute& a : mesh.attributes)
-    if (a.name == name) return a;
-  throw std::runtime_error("no attribute " + name);
-}
-
-/// That of a temporary lives on.
-inline MeshAttribute attributeOf(const Mesh&& mesh, const std::string& name) {
-  return attributeOf(mesh, name);
-}
 
 /// Every triangle split in four at the middles of its sides, with its attributes, which stay linear.
 inline Mesh midpointSplit(const Mesh& mesh) {

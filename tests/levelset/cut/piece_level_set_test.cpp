@@ -18,11 +18,10 @@
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
+#include "tests/levelset/cut/balls_and_blades.h"
 
 namespace nephele::test {
 namespace {
-
-constexpr Box kBall{{-1, -1, -1}, {1, 1, 1}};
 
 Pieces ballInPieces(int blades, float voxelSize) {
   return cutIntoLevelSets(sphere({0, 0, 0}, 1), {.voxelSize = voxelSize, .box = kBall},

@@ -25,7 +25,7 @@ std::string messageFor(const std::string& path) {
   return "no error";
 }
 
-// ---- real files; what is expected of each is in the README of the shared data ----
+// What is expected of the real files is in the README of the shared data.
 
 struct BadFile {
   const char* name;
@@ -71,8 +71,6 @@ INSTANTIATE_TEST_SUITE_P(
       for (char& c : name) c = c == '.' ? '_' : c;
       return name;
     });
-
-// ---- small faults, written here ----
 
 struct Fault {
   const char* file;
@@ -161,8 +159,6 @@ TEST(MeshIoBad, UnknownOutputFormatIsRefused) {
   Mesh mesh;
   EXPECT_THROW(writeMesh("/tmp/a.xyz", mesh), Error);
 }
-
-// ---- mutations ----
 
 // Flips, overwrites, cuts and repeats bytes; the reader must return a mesh that can be diagnosed or throw
 // Error.

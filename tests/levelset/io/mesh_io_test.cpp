@@ -9,8 +9,8 @@
 #include <fstream>
 
 #include "nephele/levelset/mesh/mesh_repair.h"
-#include "tests/levelset/io/mesh_attributes.h"
 #include "tests/support/known_meshes.h"
+#include "tests/support/mesh_attributes.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 

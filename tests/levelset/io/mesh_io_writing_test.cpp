@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "nephele/levelset/io/mesh_io.h"
-#include "tests/levelset/io/mesh_attributes.h"
+#include "tests/support/mesh_attributes.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
