@@ -17,6 +17,9 @@ elseif(NEPHELE_SANITIZE)
   message(FATAL_ERROR "NEPHELE_SANITIZE must be empty, address or thread, got '${NEPHELE_SANITIZE}'")
 endif()
 
+# For sources whose JSON is slow to optimise, and that nobody waits for.
+set(NEPHELE_QUICK_OPTIONS $<$<CONFIG:Release>:-O1>)
+
 # The standard headers that nearly every source of ours includes, compiled once for each target.
 set(NEPHELE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <optional> <span>
   <string> <utility> <vector>)
