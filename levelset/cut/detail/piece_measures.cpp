@@ -3,25 +3,24 @@
 #include <algorithm>
 #include <set>
 
+#include "nephele/levelset/cut/detail/edge_counts.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
 namespace {
 
 bool isClosed(const Mesh& mesh) {
-  std::vector<std::uint64_t> edges;
-  edges.reserve(mesh.corners.size());
-  for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
-    const auto face = mesh.face(f);
-    for (std::size_t k = 0; k < face.size(); ++k) {
-      const std::uint32_t a = face[k], b = face[(k + 1) % face.size()];
-      edges.push_back((std::uint64_t(std::min(a, b)) << 32 | std::max(a, b)) << 1 | (a < b ? 1 : 0));
-    }
-  }
-  std::sort(edges.begin(), edges.end());
-  for (std::size_t i = 0; i < edges.size(); i += 2)
-    if (i + 1 == edges.size() || edges[i] + 1 != edges[i + 1]) return false;
-  return !edges.empty();
+  bool closed = !mesh.corners.empty();
+  countEdges(
+      mesh.positions.size(),
+      [&](const auto& add) {
+        for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
+          const auto face = mesh.face(f);
+          for (std::size_t k = 0; k < face.size(); ++k) add(face[k], face[k + 1 == face.size() ? 0 : k + 1]);
+        }
+      },
+      [&](int up, int down) { closed &= up == 1 && down == 1; });
+  return closed;
 }
 
 }  // namespace
@@ -48,7 +47,7 @@ void setNeighbours(std::vector<Piece>& pieces, const ContactAreas& areas) {
 
 void checkClosed(std::vector<Piece>& pieces, const Progress& progress) {
   parallelFor(
-      pieces.size(), 16,
+      pieces.size(), 1,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) pieces[i].closed = isClosed(pieces[i].mesh);
       },

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nephele/levelset/cut/detail/edge_counts.h"
 #include "nephele/levelset/cut/detail/solids/carve.h"
 #include "nephele/modeling/base/error.h"
 
@@ -24,20 +25,17 @@ bool hasUv(const Mesh& mesh) {
 }  // namespace
 
 std::size_t openEdges(const std::vector<TriangleIndices>& triangles) {
-  std::vector<std::pair<std::uint64_t, int>> edges;
-  edges.reserve(3 * triangles.size());
+  std::uint32_t vertexCount = 0;
   for (const TriangleIndices& t : triangles)
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::uint64_t(std::min(a, b)) << 32 | std::max(a, b), a < b ? 1 : -1});
-    }
-  std::sort(edges.begin(), edges.end());
+    vertexCount = std::max({vertexCount, t[0] + 1, t[1] + 1, t[2] + 1});
   std::size_t open = 0;
-  for (std::size_t i = 0, end = 0; i < edges.size(); i = end) {
-    int net = 0;
-    for (end = i; end < edges.size() && edges[end].first == edges[i].first; ++end) net += edges[end].second;
-    open += std::size_t(std::abs(net));
-  }
+  countEdges(
+      vertexCount,
+      [&](const auto& add) {
+        for (const TriangleIndices& t : triangles)
+          for (int k = 0; k < 3; ++k) add(t[k], t[(k + 1) % 3]);
+      },
+      [&](int up, int down) { open += std::size_t(std::abs(up - down)); });
   return open;
 }
 
