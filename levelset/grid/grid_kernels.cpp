@@ -330,8 +330,10 @@ void tricubicOf(const GridMap& map, const PointBlock& points, float* values) {
   }
 }
 
+// Flattened: left to itself, the compiler calls the body for each vector.
 template <class Sample>
-void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
+HWY_FLATTEN void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values,
+                                const BlockLanes<3>& grads) {
   const D d;
   forEachVector<Sample>(map, points, [&](int i, const Cells<Sample>& cells) HWY_ATTR {
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
