@@ -10,6 +10,7 @@
 #include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_samples.h"
 #include "nephele/levelset/grid/brick_table.h"
+#include "nephele/modeling/base/system.h"
 
 namespace nephele::detail {
 
@@ -123,6 +124,7 @@ BrickMemo::BrickMemo(const ScalarField& field, float voxelSize, const Box& box, 
   if (bricks <= std::min(mostBricks, kMostBricks / kHalves)) {
     const std::size_t blocks = std::size_t(bricks) * kHalves;
     table_->values = SampleStore(blocks * kBlockSize);
+    adviseHugePages(table_->values.data(), table_->values.data() + blocks * kBlockSize);
     table_->entries = std::vector<Table::Entry>(blocks);
   }
   field_ = ScalarField(std::make_shared<MemoNode<Table>>(field.node(), table_));
