@@ -72,6 +72,7 @@ Description volumeDescription(const std::string& path) {
     if (g.type == "float" || g.type == "double") {
       last["values"] = {g.valueMin, g.valueMax};
       last["background"] = g.background;
+      if (g.notFinite > 0) last["values_not_finite"] = g.notFinite;
     }
     last["metadata"] = g.metadata;
   }

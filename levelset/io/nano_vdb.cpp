@@ -1,157 +1,216 @@
 // NanoVDB files as OpenVDB grids.
 //
-// NanoVDB trusts its files: sizes are allocated and offsets followed as they stand. So the segment headers
-// are compared with the length of the file before anything is read, and every offset to a node with the
-// length of its grid before it is followed.
-#define NANOVDB_USE_ZIP
-#define NANOVDB_USE_BLOSC
+// NanoVDB trusts its files: sizes are allocated and offsets followed as they stand, and a block that cannot
+// be decompressed goes unnoticed. So files are read here, and NanoVDB gets grids whose every offset has been
+// followed.
+#include <blosc.h>
 #include <fmt/format.h>
+#include <nanovdb/util/GridChecksum.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/NanoToOpenVDB.h>
+#include <zlib.h>
 
-#include <fstream>
+#include <array>
 
+#include "nephele/levelset/io/detail/blosc_header.h"
+#include "nephele/levelset/io/detail/file_bytes.h"
+#include "nephele/levelset/io/detail/nano_nodes.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 
 namespace nephele::detail {
 
 namespace {
 
-/// Grids expand by less than this when they are decompressed; a larger claim is damage.
-constexpr std::uint64_t kLargestExpansion = 4096;
+using Buffer = nanovdb::HostBuffer;
 
-/// Reads all headers and checks that what they announce can be in the file.
-void checkSegments(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  file.seekg(0, std::ios::end);
-  const auto fileSize = std::uint64_t(file.tellg());
-  file.seekg(0);
-  while (std::uint64_t(file.tellg()) < fileSize) {
-    nanovdb::io::Header header;
-    file.read(reinterpret_cast<char*>(&header), sizeof(header));
-    if (!file) throw Error("the file is cut short");
+/// What zlib makes of a byte at most.
+constexpr std::uint64_t kLargestExpansion = 1032;
+/// NanoVDB compresses with Blosc in pieces of this size.
+constexpr std::uint64_t kBloscPiece = std::uint64_t(1) << 30;
+
+template <class Build>
+using OpenGrid = typename decltype(nanovdb::nanoToOpenVDB(std::declval<const nanovdb::NanoGrid<Build>&>(),
+                                                          0))::element_type;
+
+template <class Build>
+openvdb::GridBase::Ptr emptyGrid() {
+  return OpenGrid<Build>::create();
+}
+
+template <class Build>
+openvdb::GridBase::Ptr convert(Buffer& buffer) {
+  NanoNodes<Build>(buffer.data(), buffer.size()).check();
+  auto* grid = reinterpret_cast<nanovdb::NanoGrid<Build>*>(buffer.data());
+  if (grid->checksum() != nanovdb::GridChecksum::EMPTY &&
+      !nanovdb::validateChecksum(*grid, nanovdb::ChecksumMode::Full))
+    throw Error("damaged: its checksum is wrong");
+  // Its name comes from the file's table of contents; here it may lie anywhere.
+  auto* data = reinterpret_cast<nanovdb::GridData*>(buffer.data());
+  data->setLongGridNameOn(false);
+  data->mGridName[0] = '\0';
+  try {
+    return nanovdb::nanoToOpenVDB(*grid);
+  } catch (const openvdb::Exception&) {
+    throw Error("its transform has no inverse, or its voxels are too small");
+  }
+}
+
+struct ValueType {
+  nanovdb::GridType type;
+  openvdb::GridBase::Ptr (*empty)();
+  openvdb::GridBase::Ptr (*convert)(Buffer& buffer);
+};
+
+template <class Build>
+constexpr ValueType valueType(nanovdb::GridType type) {
+  return {type, emptyGrid<Build>, convert<Build>};
+}
+
+constexpr std::array<ValueType, 8> kValueTypes = {{
+    valueType<float>(nanovdb::GridType::Float),
+    valueType<double>(nanovdb::GridType::Double),
+    valueType<nanovdb::Fp4>(nanovdb::GridType::Fp4),
+    valueType<nanovdb::Fp8>(nanovdb::GridType::Fp8),
+    valueType<nanovdb::Fp16>(nanovdb::GridType::Fp16),
+    valueType<nanovdb::FpN>(nanovdb::GridType::FpN),
+    valueType<nanovdb::Vec3f>(nanovdb::GridType::Vec3f),
+    valueType<std::int32_t>(nanovdb::GridType::Int32),
+}};
+
+std::string nameOf(nanovdb::GridType type) {
+  return type < nanovdb::GridType::End ? nanovdb::toStr(type) : fmt::format("type {}", std::uint32_t(type));
+}
+
+void unzip(FileBytes& bytes, std::uint64_t compressed, Buffer& target) {
+  std::vector<char> block(compressed);
+  bytes.sgetn(block.data(), std::streamsize(block.size()));
+  uLongf size = target.size();
+  const int status =
+      uncompress(target.data(), &size, reinterpret_cast<const Bytef*>(block.data()), compressed);
+  if (status != Z_OK || size != target.size()) throw Error("damaged: it cannot be decompressed");
+}
+
+void unblosc(const std::vector<char>& block, char* target, std::uint64_t size) {
+  checkBloscHeader(block.data(), std::int64_t(block.size()), std::int64_t(size));
+  if (blosc_decompress_ctx(block.data(), target, size, 1) != std::int64_t(size))
+    throw Error("damaged: it cannot be decompressed");
+}
+
+/// The grid that stands in the next `stored` bytes.
+Buffer readGrid(FileBytes& bytes, std::uint64_t stored, std::uint64_t size, nanovdb::io::Codec codec) {
+  const auto take = [&](std::uint64_t room) {
+    const auto length = room < sizeof(std::uint64_t) ? room : bytes.take<std::uint64_t>();
+    if (room < sizeof(length) || length > room - sizeof(length))
+      throw Error("damaged: a compressed block is longer than its grid");
+    return length;
+  };
+  const std::uint64_t expansion = codec == nanovdb::io::Codec::NONE ? 1 : kLargestExpansion;
+  if (size / expansion > stored || size < sizeof(nanovdb::GridData))
+    throw Error(fmt::format("damaged: {} bytes stand for {}", stored, size));
+  Buffer buffer = Buffer::create(size);
+  switch (codec) {
+    case nanovdb::io::Codec::NONE:
+      bytes.sgetn(reinterpret_cast<char*>(buffer.data()), std::streamsize(size));
+      break;
+    case nanovdb::io::Codec::ZIP:
+      unzip(bytes, take(stored), buffer);
+      break;
+    case nanovdb::io::Codec::BLOSC:
+      for (std::uint64_t done = 0; done < size; done += kBloscPiece) {
+        std::vector<char> block(take(stored));
+        stored -= sizeof(std::uint64_t) + block.size();
+        bytes.sgetn(block.data(), std::streamsize(block.size()));
+        unblosc(block, reinterpret_cast<char*>(buffer.data()) + done, std::min(kBloscPiece, size - done));
+      }
+      break;
+    default:
+      throw Error(fmt::format("damaged: unknown compression {}", int(codec)));
+  }
+  return buffer;
+}
+
+class NanoArchive {
+ public:
+  explicit NanoArchive(const std::string& path) : bytes_(path) {}
+
+  std::vector<openvdb::GridBase::Ptr> read(const WantedGrid& wanted) {
+    while (bytes_.left() > 0) readSegment(wanted);
+    if (result_.empty() && !unsupported_.empty())
+      throw Error(fmt::format("no grid of a type that can be read; it holds {} values", unsupported_));
+    return std::move(result_);
+  }
+
+ private:
+  struct Entry {
+    nanovdb::io::MetaData data;
+    std::string name;
+  };
+
+  void readSegment(const WantedGrid& wanted) {
+    const auto header = bytes_.take<nanovdb::io::Header>();
     if (header.magic != NANOVDB_MAGIC_NUMBER) throw Error("not a NanoVDB file");
     if (header.version.getMajor() != NANOVDB_MAJOR_VERSION_NUMBER)
       throw Error(
           fmt::format("NanoVDB file of version {}.{}.{}, but {}.x is needed; convert it again from its .vdb",
                       header.version.getMajor(), header.version.getMinor(), header.version.getPatch(),
                       NANOVDB_MAJOR_VERSION_NUMBER));
-    if (header.codec >= nanovdb::io::Codec::END) throw Error("damaged: unknown compression");
-    std::uint64_t dataBytes = 0;
+    std::vector<Entry> entries;
     for (int i = 0; i < header.gridCount; ++i) {
-      nanovdb::io::MetaData data;
-      file.read(reinterpret_cast<char*>(&data), sizeof(data));
-      if (!file || data.nameSize == 0 || data.nameSize > fileSize || data.fileSize > fileSize ||
-          data.gridSize / kLargestExpansion > fileSize || data.gridSize < sizeof(nanovdb::GridData))
+      Entry entry;
+      entry.data = bytes_.take<nanovdb::io::MetaData>();
+      if (entry.data.nameSize == 0 || entry.data.nameSize > bytes_.left())
         throw Error("the file is cut short or damaged: its grid header does not fit");
-      std::string name(data.nameSize, '\0');
-      file.read(name.data(), std::streamsize(name.size()));
-      if (!file || name.back() != '\0') throw Error("damaged: a grid's name does not end");
-      dataBytes += data.fileSize;
+      entry.name.resize(entry.data.nameSize);
+      bytes_.sgetn(entry.name.data(), std::streamsize(entry.name.size()));
+      if (entry.name.back() != '\0') throw Error("damaged: a grid's name does not end");
+      entry.name.resize(std::strlen(entry.name.c_str()));
+      entries.push_back(std::move(entry));
     }
-    const auto position = std::uint64_t(file.tellg());
-    if (dataBytes > fileSize - position)
-      throw Error(fmt::format("the file is cut short: its grids end at byte {}, the file at byte {}",
-                              position + dataBytes, fileSize));
-    file.seekg(std::streamoff(dataBytes), std::ios::cur);
-  }
-}
-
-/// Throws unless `bytes` bytes from `node` lie within the grid.
-class Extent {
- public:
-  Extent(const void* begin, std::uint64_t size)
-      : begin_(reinterpret_cast<std::uintptr_t>(begin)), size_(size) {}
-
-  void require(const void* node, std::uint64_t bytes) const {
-    const std::uintptr_t offset = reinterpret_cast<std::uintptr_t>(node) - begin_;
-    if (offset > size_ || bytes > size_ - offset || offset % alignof(std::uint64_t) != 0)
-      throw Error("damaged: an offset leads out of its grid");
-  }
-
- private:
-  std::uintptr_t begin_;
-  std::uint64_t size_;
-};
-
-template <class Node>
-void checkNode(const Node& node, const Extent& extent) {
-  if constexpr (Node::LEVEL > 0) {
-    using Child = typename Node::ChildNodeType;
-    extent.require(&node, sizeof(Node));
-    const auto* data = node.data();
-    for (std::uint32_t n = 0; n < (1u << (3 * Node::LOG2DIM)); ++n)
-      if (data->mChildMask.isOn(n)) {
-        const Child* child = data->getChild(n);
-        extent.require(child, 64);
-        checkNode(*child, extent);
+    for (const Entry& entry : entries) {
+      if (entry.data.fileSize > std::uint64_t(bytes_.left()))
+        throw Error(fmt::format("the file is cut short: its grids end after byte {}, the file at byte {}",
+                                std::uint64_t(bytes_.position()) + entry.data.fileSize, bytes_.size()));
+      const std::int64_t end = bytes_.position() + std::int64_t(entry.data.fileSize);
+      try {
+        readEntry(entry, header.codec, wanted);
+      } catch (const Error& error) {
+        throw Error(fmt::format("grid '{}': {}", entry.name, error.what()));
       }
-  } else {
-    if constexpr (std::is_same_v<typename Node::BuildType, nanovdb::FpN>)
-      extent.require(&node, node.data()->memUsage());
-    else
-      extent.require(&node, sizeof(Node));
+      bytes_.moveTo(end);
+    }
   }
-}
 
-template <class Build>
-openvdb::GridBase::Ptr convert(const nanovdb::GridHandle<>& handle) {
-  const auto* grid = reinterpret_cast<const nanovdb::NanoGrid<Build>*>(handle.data());
-  const Extent extent(handle.data(), handle.size());
-  extent.require(grid, sizeof(*grid));
-  const auto& tree = grid->tree();
-  extent.require(&tree, sizeof(tree));
-  const auto& root = tree.root();
-  extent.require(&root, sizeof(*root.data()));
-  const auto* data = root.data();
-  using Root = std::decay_t<decltype(root)>;
-  extent.require(data + 1, std::uint64_t(data->mTableSize) * sizeof(typename Root::DataType::Tile));
-  for (std::uint32_t i = 0; i < data->mTableSize; ++i)
-    if (const auto* tile = data->tile(i); tile->isChild()) checkNode(*data->getChild(tile), extent);
-  return nanovdb::nanoToOpenVDB(*grid);
-}
-
-openvdb::GridBase::Ptr convertAny(const nanovdb::GridHandle<>& handle) {
-  const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle.data());
-  if (handle.size() < sizeof(nanovdb::GridData) || grid->mMagic != NANOVDB_MAGIC_NUMBER)
-    throw Error("damaged: a grid does not start with NanoVDB's mark");
-  switch (grid->mGridType) {
-    case nanovdb::GridType::Float:
-      return convert<float>(handle);
-    case nanovdb::GridType::Double:
-      return convert<double>(handle);
-    case nanovdb::GridType::Fp4:
-      return convert<nanovdb::Fp4>(handle);
-    case nanovdb::GridType::Fp8:
-      return convert<nanovdb::Fp8>(handle);
-    case nanovdb::GridType::Fp16:
-      return convert<nanovdb::Fp16>(handle);
-    case nanovdb::GridType::FpN:
-      return convert<nanovdb::FpN>(handle);
-    case nanovdb::GridType::Vec3f:
-      return convert<nanovdb::Vec3f>(handle);
-    case nanovdb::GridType::Int32:
-      return convert<std::int32_t>(handle);
-    default:
-      return nullptr;
+  void readEntry(const Entry& entry, nanovdb::io::Codec codec, const WantedGrid& wanted) {
+    const auto* type = std::find_if(kValueTypes.begin(), kValueTypes.end(), [&](const ValueType& known) {
+      return known.type == entry.data.gridType;
+    });
+    if (type == kValueTypes.end()) {
+      unsupported_ = nameOf(entry.data.gridType);
+      return;
+    }
+    openvdb::GridBase::Ptr grid = type->empty();
+    if (wanted(*grid, entry.name)) {
+      Buffer buffer = readGrid(bytes_, entry.data.fileSize, entry.data.gridSize, codec);
+      const auto* data = reinterpret_cast<const nanovdb::GridData*>(buffer.data());
+      if (data->mMagic != NANOVDB_MAGIC_NUMBER) throw Error("damaged: it does not start with NanoVDB's mark");
+      if (data->mGridType != type->type || data->mGridClass >= nanovdb::GridClass::End)
+        throw Error(fmt::format("damaged: its values are of {}, not {}", nameOf(data->mGridType),
+                                nameOf(type->type)));
+      grid = type->convert(buffer);
+    }
+    grid->setName(entry.name);
+    result_.push_back(grid);
   }
-}
+
+  FileBytes bytes_;
+  std::vector<openvdb::GridBase::Ptr> result_;
+  std::string unsupported_;
+};
 
 }  // namespace
 
-std::vector<openvdb::GridBase::Ptr> readNanoVdb(const std::string& path) {
-  checkSegments(path);
-  std::vector<openvdb::GridBase::Ptr> result;
-  std::string unsupported;
-  for (const auto& handle : nanovdb::io::readGrids(path)) {
-    if (auto grid = convertAny(handle))
-      result.push_back(grid);
-    else
-      unsupported = nanovdb::toStr(reinterpret_cast<const nanovdb::GridData*>(handle.data())->mGridType);
-  }
-  if (result.empty() && !unsupported.empty())
-    throw Error(fmt::format("no grid of a type that can be read; it holds {} values", unsupported));
-  return result;
+std::vector<openvdb::GridBase::Ptr> readNanoVdb(const std::string& path, const WantedGrid& wanted) {
+  return NanoArchive(path).read(wanted);
 }
 
 }  // namespace nephele::detail

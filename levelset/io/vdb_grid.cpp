@@ -1,10 +1,13 @@
 // Grids of files: where names, classes and OpenVDB's sign are turned into ours and back.
 #include <fmt/format.h>
-#include <openvdb/tools/Count.h>
+#include <openvdb/tree/NodeManager.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/io/detail/vdb_check.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {
@@ -45,6 +48,53 @@ detail::TreeValues fogValues(float background, const std::string& name) {
   require(background == 0.0f, fmt::format("grid {}: a fog volume must be 0 outside, but its background is {}",
                                           name.empty() ? "without a name" : "'" + name + "'", background));
   return detail::TreeValues::fog();
+}
+
+/// Of the active values of a tree.
+struct FiniteValues {
+  FiniteValues() = default;
+  FiniteValues(const FiniteValues&, tbb::split) {}
+
+  double min = std::numeric_limits<double>::infinity();
+  double max = -std::numeric_limits<double>::infinity();
+  /// Voxels whose value is infinite or not a number.
+  std::uint64_t notFinite = 0;
+
+  template <class Node>
+  bool operator()(const Node& node, std::size_t) {
+    for (auto value = node.cbeginValueOn(); value; ++value) {
+      const auto v = double(*value);
+      if (std::isfinite(v)) {
+        min = std::min(min, v);
+        max = std::max(max, v);
+      } else {
+        notFinite += voxelsOf(node);
+      }
+    }
+    return true;
+  }
+  void join(const FiniteValues& other) {
+    min = std::min(min, other.min);
+    max = std::max(max, other.max);
+    notFinite += other.notFinite;
+  }
+
+ private:
+  /// Of one of its values.
+  template <class Node>
+  static std::uint64_t voxelsOf(const Node&) {
+    if constexpr (Node::LEVEL == 0)
+      return 1;
+    else
+      return std::uint64_t(Node::ChildNodeType::NUM_VOXELS);
+  }
+};
+
+template <class Tree>
+FiniteValues finiteValues(const Tree& tree) {
+  FiniteValues result;
+  openvdb::tree::DynamicNodeManager<const Tree>(tree).reduceTopDown(result);
+  return result;
 }
 
 VdbGrid labelled(const openvdb::GridBase::Ptr& grid, const VdbGridLabel& label) {
@@ -146,7 +196,20 @@ VdbGridInfo describe(const VdbGrid& handle) {
   info.type = grid.valueType();
   info.gridClass = classOf(grid);
   info.activeVoxels = grid.activeVoxelCount();
-  if (const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox(); !box.empty()) {
+  info.memoryBytes = grid.memUsage();
+  openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  if (!detail::isCheckable(grid)) {
+    // Their values are not read; the file tells of them.
+    using openvdb::GridBase;
+    const auto count = grid.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
+    const auto bytes = grid.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_MEM_BYTES);
+    const auto low = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
+    const auto high = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
+    if (count) info.activeVoxels = std::uint64_t(std::max<std::int64_t>(0, count->value()));
+    if (bytes) info.memoryBytes = std::uint64_t(std::max<std::int64_t>(0, bytes->value()));
+    if (low && high) box = {openvdb::Coord(low->value()), openvdb::Coord(high->value())};
+  }
+  if (!box.empty()) {
     info.indexMin = {box.min().x(), box.min().y(), box.min().z()};
     info.indexMax = {box.max().x(), box.max().y(), box.max().z()};
   }
@@ -162,14 +225,14 @@ VdbGridInfo describe(const VdbGrid& handle) {
   }
   const auto scalar = [&](const auto& typed) {
     info.background = float(typed.background());
-    const auto extrema = openvdb::tools::minMax(typed.tree());
-    info.valueMin = info.activeVoxels > 0 ? float(extrema.min()) : 0.0f;
-    info.valueMax = info.activeVoxels > 0 ? float(extrema.max()) : 0.0f;
+    const FiniteValues values = finiteValues(typed.tree());
+    info.valueMin = values.min <= values.max ? float(values.min) : 0.0f;
+    info.valueMax = values.min <= values.max ? float(values.max) : 0.0f;
+    info.notFinite = values.notFinite;
   };
   if (grid.isType<openvdb::FloatGrid>()) scalar(static_cast<const openvdb::FloatGrid&>(grid));
   if (grid.isType<openvdb::DoubleGrid>()) scalar(static_cast<const openvdb::DoubleGrid&>(grid));
   info.halfFloat = grid.saveFloatAsHalf();
-  info.memoryBytes = grid.memUsage();
   for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry)
     info.metadata[entry->first] = entry->second->str();
   return info;

@@ -59,7 +59,8 @@ std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const det
   checkReadable(path);
   detail::initializeOpenVdb();
   return translateReadErrors(path, [&] {
-    return lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path) : detail::readOpenVdb(path, wanted);
+    return lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path, wanted)
+                                           : detail::readOpenVdb(path, wanted);
   });
 }
 

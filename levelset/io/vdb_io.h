@@ -40,7 +40,8 @@ struct VdbGridInfo {
   Vec3f voxelSize{};
   bool uniform = true;  ///< Uniform scale and translation only.
   float background = 0.0f;
-  float valueMin = 0.0f, valueMax = 0.0f;  ///< Over active values; scalar grids only.
+  float valueMin = 0.0f, valueMax = 0.0f;  ///< Over finite active values; scalar grids only.
+  std::uint64_t notFinite = 0;  ///< Active voxels that are infinite or not a number; scalar grids only.
   bool halfFloat = false;
   std::uint64_t memoryBytes = 0;
   std::map<std::string, std::string> metadata;

@@ -39,8 +39,8 @@ using WantedGrid = std::function<bool(const openvdb::GridBase& type, const std::
 /// @throws std::exception, Error; the caller adds the path.
 std::vector<openvdb::GridBase::Ptr> readOpenVdb(const std::string& path, const WantedGrid& wanted);
 
-/// Every grid of a NanoVDB file. @throws std::exception, Error; the caller adds the path.
-std::vector<openvdb::GridBase::Ptr> readNanoVdb(const std::string& path);
+/// As readOpenVdb, of a NanoVDB file.
+std::vector<openvdb::GridBase::Ptr> readNanoVdb(const std::string& path, const WantedGrid& wanted);
 
 }  // namespace detail
 }  // namespace nephele

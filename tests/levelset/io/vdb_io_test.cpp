@@ -368,31 +368,6 @@ TEST(VdbIo, FilesCutAnywhereAreRefused) {
   EXPECT_THROW(readVdbFile(folder.file("")), Error);
 }
 
-TEST(VdbIo, DamagedBytesAreAnErrorOrOtherValuesButNothingWorse) {
-  // OpenVDB 10.0.1 by itself writes past its buffers on many such files.
-  const TemporaryFolder folder;
-  writeVdbFile(folder.file("whole.vdb"), {ballGrid(0.1)}, {});
-  const std::string whole = textOf(folder.file("whole.vdb"));
-  // From the transform on: what stands before are names and numbers, whose lengths OpenVDB allocates as they
-  // are.
-  const std::size_t tree = whole.find("UniformScaleMap");
-  ASSERT_NE(tree, std::string::npos);
-  int refused = 0;
-  for (unsigned seed = 0; seed < 150; ++seed) {
-    std::mt19937 random(seed);
-    std::string damaged = whole;
-    for (int k = 0; k < 3; ++k) damaged[tree + random() % 2500] = char(random());
-    std::ofstream(folder.file("damaged.vdb"), std::ios::binary) << damaged;
-    try {
-      describe(readScalarGrid(folder.file("damaged.vdb")));
-    } catch (const Error& e) {
-      ++refused;
-      EXPECT_NE(std::string(e.what()), "");
-    }
-  }
-  EXPECT_GT(refused, 50);
-}
-
 TEST(VdbIo, NanoVdbFilesCutAnywhereAreRefused) {
   const std::string path = sharedData("volumes/teapot_cloud.nvdb");
   NEPHELE_REQUIRE_SHARED_DATA(path);

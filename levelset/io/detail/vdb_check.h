@@ -1,0 +1,30 @@
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <string>
+
+#include "nephele/levelset/io/detail/file_bytes.h"
+
+namespace nephele::detail {
+
+// What OpenVDB would read next, followed ahead of it with every length, count and place compared with what
+// the file can hold; OpenVDB itself trusts them. Each function begins at the present position and returns to
+// it. All throw Error, without the path.
+
+/// Names and values of metadata: lengths that do not fit are found before anything is allocated for them.
+/// What tells where delayed loading finds its blocks is hidden from OpenVDB, which would trust its contents.
+void checkMetadata(FileBytes& bytes);
+
+/// The names and offsets of a grid in the table of contents.
+void checkDescriptor(FileBytes& bytes);
+
+/// Whether the values of such grids can be followed: numbers, vectors, booleans and masks, not points.
+bool isCheckable(const openvdb::GridBase& grid);
+
+/// Compression, metadata and transform of a grid and, with `hasTree`, the tree with all its blocks. `grid`
+/// has the type of the one to be read, which must be checkable then.
+void checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree);
+
+}  // namespace nephele::detail
