@@ -27,29 +27,30 @@ class NanoNodes {
   NanoNodes(void* grid, std::uint64_t size) : grid_(static_cast<Grid*>(grid)), size_(size) {}
 
   void check() {
-    require(grid_, sizeof(Grid));
-    auto& tree = grid_->tree();
-    require(&tree, sizeof(tree));
-    auto& root = tree.root();
-    require(&root, sizeof(typename Root::DataType));
-    auto* data = root.data();
+    using RootData = typename Root::DataType;
+    auto* const tree = at<nanovdb::TreeData<3>>(grid_, sizeof(Grid));
+    auto* const data = at<RootData>(tree, tree->mNodeOffset[3]);
     const std::uint64_t tableSize = data->mTableSize;
-    require(data + 1, tableSize * sizeof(typename Root::DataType::Tile));
+    at<typename RootData::Tile>(data, sizeof(RootData), tableSize * sizeof(typename RootData::Tile));
     std::set<Coord> origins;
     for (std::uint32_t i = 0; i < tableSize; ++i) {
       auto* tile = data->tile(i);
       if (!origins.insert(tile->origin()).second) throw Error("damaged: two nodes begin at the same voxel");
-      if (tile->isChild()) checkNode(*data->getChild(tile), tile->origin());
+      if (tile->isChild())
+        checkNode(*at<typename Root::ChildNodeType>(data, std::uint64_t(tile->child)), tile->origin());
     }
     for (int level = 0; level < 3; ++level) checkLevel(level);
   }
 
  private:
-  void require(const void* node, std::uint64_t bytes) const {
-    const std::uint64_t offset =
-        reinterpret_cast<std::uintptr_t>(node) - reinterpret_cast<std::uintptr_t>(grid_);
-    if (offset > size_ || bytes > size_ - offset || offset % alignof(std::uint64_t) != 0)
+  /// What lies `offset` bytes from a place in the grid, if there is room for `bytes` of it.
+  template <class T>
+  T* at(const void* from, std::uint64_t offset, std::uint64_t bytes = sizeof(T)) const {
+    auto* const begin = reinterpret_cast<char*>(grid_);
+    const std::uint64_t place = std::uint64_t(static_cast<const char*>(from) - begin) + offset;
+    if (place > size_ || bytes > size_ - place || place % NANOVDB_DATA_ALIGNMENT != 0)
       throw Error("damaged: an offset leads out of its grid");
+    return reinterpret_cast<T*>(begin + place);
   }
 
   template <class Node>
@@ -66,9 +67,8 @@ class NanoNodes {
 
   template <class Node>
   void checkNode(Node& node, const Coord& origin) {
-    require(&node, sizeof(Node));
     const std::uint64_t bytes = bytesOf(node);
-    require(&node, bytes);
+    at<Node>(&node, 0, bytes);
     auto& all = nodes_[Node::LEVEL];
     all.push_back({reinterpret_cast<std::uintptr_t>(&node), bytes});
     // Found here, before the children of a node with many parents are followed again and again.
@@ -87,7 +87,8 @@ class NanoNodes {
         constexpr int kSide = int(Node::ChildNodeType::DIM);
         const Coord offset(int(n >> (2 * Node::LOG2DIM)) * kSide, int((n >> Node::LOG2DIM) & kMask) * kSide,
                            int(n & kMask) * kSide);
-        checkNode(*data->getChild(n), origin + offset);
+        checkNode(*at<typename Node::ChildNodeType>(data, std::uint64_t(data->mTable[n].child)),
+                  origin + offset);
       }
     }
   }
@@ -102,7 +103,7 @@ class NanoNodes {
 
   void checkLevel(int level) {
     auto& all = nodes_[level];
-    const auto* tree = reinterpret_cast<const nanovdb::TreeData<3>*>(&grid_->tree());
+    const auto* tree = reinterpret_cast<const nanovdb::TreeData<3>*>(grid_ + 1);
     if (all.size() != tree->mNodeCount[level]) throw Error("damaged: its nodes are not as many as it says");
     std::sort(all.begin(), all.end(), [](const Place& a, const Place& b) { return a.address < b.address; });
     for (std::size_t i = 1; i < all.size(); ++i)
