@@ -27,14 +27,11 @@ class VdbArchive : public openvdb::io::Archive {
  public:
   explicit VdbArchive(const std::string& path) : bytes_(path), stream_(&bytes_) {
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
-    checkMagic();
+    checkStart();
     // Holds what readers of values need to know of the file.
     metadata_ = std::make_shared<openvdb::io::StreamMetadata>(stream_);
     openvdb::io::setStreamMetadataPtr(stream_, metadata_, /*transfer=*/false);
     readHeader(stream_);
-    if (fileVersion() < kOldestVersion || fileVersion() > openvdb::OPENVDB_FILE_VERSION)
-      throw Error(fmt::format("VDB file of version {}; versions {} to {} can be read", fileVersion(),
-                              kOldestVersion, std::uint32_t(openvdb::OPENVDB_FILE_VERSION)));
     setFormatVersion(stream_);
     setLibraryVersion(stream_);
     setDataCompression(stream_);
@@ -116,7 +113,7 @@ class VdbArchive : public openvdb::io::Archive {
     }
   }
 
-  void checkMagic() {
+  void checkStart() {
     if (bytes_.startsWith("version https://git-lfs"))
       throw Error("not a VDB file but a Git LFS pointer; fetch the real file with 'git lfs pull'");
     std::int32_t magic = 0;
@@ -125,6 +122,12 @@ class VdbArchive : public openvdb::io::Archive {
       stream_.seekg(0);
     }
     if (magic != openvdb::OPENVDB_MAGIC) throw Error("not a VDB file");
+    bytes_.moveTo(sizeof(std::int64_t));
+    const auto version = bytes_.take<std::uint32_t>();
+    bytes_.moveTo(0);
+    if (version < kOldestVersion || version > openvdb::OPENVDB_FILE_VERSION)
+      throw Error(fmt::format("VDB file of version {}; versions {} to {} can be read", version,
+                              kOldestVersion, std::uint32_t(openvdb::OPENVDB_FILE_VERSION)));
   }
 
   void checkOffsets(const openvdb::io::GridDescriptor& descriptor) const {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +17,10 @@ namespace nephele {
 
 namespace {
 
-[[noreturn]] void failReading(const std::string& path, const std::string& reason) {
+/// In one line: names inside damaged files may hold anything.
+[[noreturn]] void failReading(const std::string& path, std::string reason) {
+  std::replace_if(
+      reason.begin(), reason.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
   throw Error(fmt::format("{}: {}", path, reason));
 }
 
@@ -43,15 +47,12 @@ auto translateReadErrors(const std::string& path, const Body& body) {
   try {
     return body();
   } catch (const Error& e) {
-    if (std::string_view(e.what()).starts_with(path)) throw;
-    failReading(path, e.what());
+    const std::string reason = e.what();
+    failReading(path, reason.starts_with(path + ": ") ? reason.substr(path.size() + 2) : reason);
   } catch (const std::bad_alloc&) {
     failReading(path, "damaged, or too large for the memory of this machine");
   } catch (const std::exception& e) {
-    std::string reason = e.what();
-    for (char& c : reason)
-      if (c == '\n' || c == '\t') c = ' ';
-    failReading(path, reason);
+    failReading(path, e.what());
   }
 }
 
