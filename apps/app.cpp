@@ -90,8 +90,7 @@ int runBody(const Verb& verb, ProgramRun& run, const CommonOptions& options) {
     verb.body(run);
     run.finish();
     if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
-    std::cout.flush();
-    require(std::fflush(stdout) == 0, "the standard output could not be written");
+    require(std::cout.flush().good() && std::fflush(stdout) == 0, "the standard output could not be written");
     return 0;
   } catch (const Cancelled&) {
     run.finish();

@@ -46,7 +46,7 @@ std::vector<CutPart> CutArguments::readParts(Run& run) const {
   if (!isListed && !isVolumeFile(input)) {
     run.begin("repair");
     for (CutPart& part : parts) {
-      RepairedMesh repaired = repairMesh(part.mesh, repair, run);
+      RepairedMesh repaired = namingFile(input, [&] { return repairMesh(part.mesh, repair, run); });
       for (const std::string& what : repaired.repairs)
         run.note(parts.size() > 1 ? fmt::format("{}: {}", part.name, what) : what);
       part.mesh = std::move(repaired.mesh);

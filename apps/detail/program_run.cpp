@@ -28,6 +28,12 @@ extern "C" void onStopSignal(int signal) {
   receivedSignal = signal;
 }
 
+/// On stderr. What cannot be printed is lost: a note must not fail a job.
+template <class... Values>
+void say(fmt::format_string<Values...> format, Values&&... values) {
+  std::fputs(fmt::format(format, std::forward<Values>(values)...).c_str(), stderr);
+}
+
 std::string inUnits(double bytes) {
   return bytes >= 1e9 ? fmt::format("{:.1f} GB", bytes / 1e9) : fmt::format("{:.0f} MB", bytes / 1e6);
 }
@@ -98,7 +104,7 @@ void ProgramRun::endStage() const {
   clearBar();
   const bool slow = seconds >= 2;
   if (options_.verbose || (slow && !options_.quiet && !terminal_))
-    fmt::print(stderr, "nephele {}: {}: {:.2f} s\n", verb_, stage_, seconds);
+    say("nephele {}: {}: {:.2f} s\n", verb_, stage_, seconds);
   stage_.clear();
 }
 
@@ -141,20 +147,19 @@ void ProgramRun::draw(double fraction) const {
   if (terminal_) {
     constexpr int kWidth = 30;
     const int filled = int(fraction * kWidth);
-    fmt::print(stderr, "\r\033[K{} [{}{}] {:3.0f} %  {:.1f} %/s  {:.0f} s left", stage_,
-               std::string(filled, '#'), std::string(kWidth - filled, '.'), fraction * 100,
-               fraction * 100 / seconds, left);
+    say("\r\033[K{} [{}{}] {:3.0f} %  {:.1f} %/s  {:.0f} s left", stage_, std::string(filled, '#'),
+        std::string(kWidth - filled, '.'), fraction * 100, fraction * 100 / seconds, left);
     std::fflush(stderr);
     barShown_ = true;
   } else if (const auto now = lastDrawn_.load(); seconds >= 2 && now - lastLine_ >= 5000) {
     lastLine_ = now;
-    fmt::print(stderr, "nephele {}: {}: {:.0f} %, {:.0f} s left\n", verb_, stage_, fraction * 100, left);
+    say("nephele {}: {}: {:.0f} %, {:.0f} s left\n", verb_, stage_, fraction * 100, left);
   }
 }
 
 void ProgramRun::clearBar() const {
   if (!barShown_) return;
-  fmt::print(stderr, "\r\033[K");
+  say("\r\033[K");
   std::fflush(stderr);
   barShown_ = false;
 }
@@ -163,7 +168,7 @@ void ProgramRun::note(std::string_view message) const {
   if (options_.quiet) return;
   const std::lock_guard lock(mutex_);
   clearBar();
-  fmt::print(stderr, "nephele {}: {}\n", verb_, message);
+  say("nephele {}: {}\n", verb_, message);
 }
 
 void ProgramRun::detail(std::string_view message) const {

@@ -1,12 +1,13 @@
 #include "apps/options/config_file.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <optional>
 
 #include "apps/options/options.h"
+#include "apps/options/toml_file.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -47,9 +48,11 @@ std::vector<std::string> withConfigFile(const CLI::App& verb, std::vector<std::s
 
   toml::table table;
   try {
-    table = toml::parse_file(*path);
+    table = readToml(*path);
   } catch (const toml::parse_error& error) {
     refuse(*path, error.source().begin, std::string(error.description()));
+  } catch (const Error& error) {
+    throw CLI::ParseError(fmt::format("--config: {}", error.what()), CLI::ExitCodes::InvalidError);
   }
 
   std::vector<std::string> names;

@@ -1,11 +1,11 @@
 #include "apps/options/layer_recipe.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <cmath>
 
 #include "apps/options/cloud_quantities.h"
+#include "apps/options/toml_file.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"
@@ -206,7 +206,7 @@ void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, F
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
   toml::table file;
   try {
-    file = toml::parse_file(path);
+    file = readToml(path);
   } catch (const toml::parse_error& error) {
     const auto line = error.source().begin.line;
     throw CLI::ValidationError(

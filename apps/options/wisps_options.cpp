@@ -34,7 +34,7 @@ std::vector<WispGuide> inShape(WispsArguments::Shape shape, float size, const Gu
 
 std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const GuideOptions& options,
                               Run& run) {
-  const RepairedMesh repaired = repairMesh(mesh, {}, run);
+  const RepairedMesh repaired = namingFile(path, [&] { return repairMesh(mesh, {}, run); });
   for (const std::string& repair : repaired.repairs) run.note(path + ": " + repair);
   const Box box = boundingBox(repaired.mesh);
   const double voxel = double(box.longestSide()) / kInsideResolution;

@@ -42,7 +42,7 @@ void convert(const LevelsetOptions& options, Run& run) {
   run.begin("read");
   const Mesh soup = readMesh(options.input);
   run.begin("repair");
-  RepairedMesh repaired = repairMesh(soup, options.repair, run);
+  RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, options.repair, run); });
   for (const std::string& repair : repaired.repairs) run.note(repair);
   if (options.subdivide > 0) {
     repaired.mesh = subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run);
@@ -56,7 +56,8 @@ void convert(const LevelsetOptions& options, Run& run) {
   run.requireMemory(
       estimateLevelSetBytes(repaired.mesh, conversion),
       "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");
-  VoxelGrid<float> level = meshToLevelSet(repaired.mesh, conversion, run);
+  VoxelGrid<float> level =
+      namingFile(options.input, [&] { return meshToLevelSet(repaired.mesh, conversion, run); });
   const double volume = enclosedVolume(level);
 
   run.begin("write");

@@ -72,8 +72,10 @@ Mesh cloudShapeMesh(const CloudShapeOptions& options, const Progress& progress) 
 }
 
 RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
-  return repairMesh(isVolumeFile(path) ? surfaceOfLevelSet(path, progress) : readMesh(path), repair,
-                    progress);
+  return namingFile(path, [&] {
+    return repairMesh(isVolumeFile(path) ? surfaceOfLevelSet(path, progress) : readMesh(path), repair,
+                      progress);
+  });
 }
 
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {

@@ -28,4 +28,19 @@ inline void require(bool condition, const std::string& message) {
   if (!condition) throw Error(message);
 }
 
+/// What `work` gives; its errors begin with the file that they are about. @throws Error, Cancelled as `work`
+/// does
+template <class Work>
+auto namingFile(const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.starts_with(path)) throw;
+    throw Error(path + ": " + message);
+  }
+}
+
 }  // namespace nephele

@@ -58,15 +58,18 @@ DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
         high[axis] = std::max(high[axis], seen[axis]);
       }
     }
-    if (!(low.z > 0)) {
+    if (!(low.z > 0 && low.x <= high.x && low.y <= high.y)) {
       cells_.assign(cells_.size(), {0, std::numeric_limits<float>::infinity()});
       return;
     }
-    const auto cellOf = [](double at, int from) { return std::floor((at - from) / kCell); };
-    const int x0 = int(std::max(cellOf(low.x - kSpread, window_.x0), 0.0)),
-              y0 = int(std::max(cellOf(low.y - kSpread, window_.y0), 0.0)),
-              x1 = int(std::min(cellOf(high.x + kSpread, window_.x0), double(across_ - 1))),
-              y1 = int(std::min(cellOf(high.y + kSpread, window_.y0), double(down - 1)));
+    // Far beyond the window numbers of cells are no ints.
+    const auto cellOf = [](double at, int from, int count) {
+      return int(std::clamp(std::floor((at - from) / kCell), -1.0, double(count)));
+    };
+    const int x0 = std::max(cellOf(low.x - kSpread, window_.x0, across_), 0),
+              y0 = std::max(cellOf(low.y - kSpread, window_.y0, down), 0),
+              x1 = std::min(cellOf(high.x + kSpread, window_.x0, across_), across_ - 1),
+              y1 = std::min(cellOf(high.y + kSpread, window_.y0, down), down - 1);
     // Depths are rounded to float here and again by whoever asks.
     const float near = float(low.z * (1 - 1e-5)), far = float(high.z * (1 + 1e-5));
     for (int y = y0; y <= y1; ++y)

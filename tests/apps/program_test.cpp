@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -129,6 +130,44 @@ TEST(Program, ConfigFileWithAnUnknownKeyNamesItsLine) {
                                           " --config " + folder.file("options.toml"));
   EXPECT_EQ(result.exitCode, 2);
   EXPECT_NE(result.errors.find("options.toml:2"), std::string::npos) << result.errors;
+}
+
+// /dev/full takes every write and says that the disk is full.
+TEST(Program, WhatCannotBePrintedFailsNoJobButAnAnswerThatCannotBePrintedDoes) {
+  const TemporaryFolder folder;
+  const std::string convert =
+      programPath() + " levelset " + kMesh + " --resolution 16 --verbose -o " + folder.file("out.vdb");
+  EXPECT_EQ(WEXITSTATUS(std::system((convert + " 2>/dev/full >/dev/null").c_str())), 0);
+  EXPECT_EQ(WEXITSTATUS(std::system((convert + " 2>&- >/dev/null").c_str())), 0);
+  EXPECT_EQ(WEXITSTATUS(std::system((programPath() + " info " + kMesh + " >/dev/full 2>/dev/null").c_str())),
+            1);
+  EXPECT_EQ(WEXITSTATUS(std::system((programPath() + " info " + kMesh + " >&- 2>/dev/null").c_str())), 1);
+}
+
+TEST(Program, ConfigFilesThatAreNoneAreRefused) {
+  const TemporaryFolder folder;
+  std::string dotted = "a";
+  for (int i = 0; i != 100000; ++i) dotted += ".a";
+  std::ofstream(folder.file("dotted.toml")) << "# fine.....\n'a.b' = 1\n" << dotted << " = 1\n";
+  const std::string convert = "levelset " + kMesh + " -o " + folder.file("out.vdb") + " --config ";
+  const ProgramResult nested = runProgram(convert + folder.file("dotted.toml"));
+  EXPECT_EQ(nested.exitCode, 2);
+  EXPECT_NE(nested.errors.find("dotted.toml:3: a key nests more than 32 deep"), std::string::npos)
+      << nested.errors;
+  const ProgramResult notAFile = runProgram(convert + folder.file("."));
+  EXPECT_EQ(notAFile.exitCode, 2);
+  EXPECT_NE(notAFile.errors.find("is a folder"), std::string::npos) << notAFile.errors;
+}
+
+TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("far.obj")) << "v 0 0 0\nv 1e39 0 0\nv 0 1e39 0\nv 0 0 1e39\n"
+                                           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  const ProgramResult result =
+      runProgram("levelset " + folder.file("far.obj") + " --repair wrap -o " + folder.file("out.vdb"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("far.obj"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("too large"), std::string::npos) << result.errors;
 }
 
 TEST(Program, StatisticsHoldTheCommonFields) {
