@@ -45,7 +45,7 @@ void addCommonOptions(CLI::App& app, CommonOptions& options) {
   app.add_option("--config", options.config, "Read options by name from a TOML file; the command line wins.")
       ->type_name("FILE")
       ->group(group);
-  app.add_option("--stats", options.stats, "Write statistics as one JSON object.")
+  markOutput(app.add_option("--stats", options.stats, "Write statistics as one JSON object."))
       ->type_name("FILE")
       ->group(group);
   app.add_option("--progress", options.progress, "auto, or alf for lines that farm software reads.")
@@ -84,9 +84,11 @@ int usageError(const std::string& who, const std::string& what) {
   return kUsage;
 }
 
-int runBody(const Verb& verb, ProgramRun& run, const CommonOptions& options) {
+int runBody(const Verb& verb, CLI::App& app, ProgramRun& run, const CommonOptions& options) {
   const std::string who = "nephele " + verb.name;
   try {
+    requireDistinctOutputs(app);
+    tryOutputs(app);
     verb.body(run);
     run.finish();
     if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
@@ -148,7 +150,7 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
         options.threads > 0 ? std::size_t(options.threads)
                             : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return runBody(verb, run, options);
+    return runBody(verb, app, run, options);
   } catch (const CLI::CallForHelp&) {
     std::cout << app.help();
     return 0;

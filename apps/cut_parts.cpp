@@ -26,7 +26,8 @@ std::vector<CutPart> readInput(const CutArguments& a, Run& run) {
   if (isVolumeFile(a.input)) {
     part.level = readLevelSet(a.input);
     const bool isExact = a.geometry == CutArguments::Geometry::exact;
-    part.mesh = isExact ? marchingTetrahedra(*part.level, run) : marchingCubes(*part.level);
+    part.mesh = namingFile(
+        a.input, [&] { return isExact ? marchingTetrahedra(*part.level, run) : marchingCubes(*part.level); });
     if (part.mesh.faceCount() == 0) throw Error(a.input + ": its level set has no surface");
   } else {
     part.mesh = readMesh(a.input);

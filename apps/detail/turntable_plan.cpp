@@ -138,6 +138,9 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   }
   for (const int number : numbers)
     frames.push_back({number, output.path(number), preview ? preview->path(number) : ""});
+  for (const TurntableFrame& frame : frames)
+    if (!options.contactSheet.empty() && options.contactSheet == frame.preview)
+      refuseValue("--contact-sheet", options.contactSheet, "another file than that of a frame of --preview");
 }
 
 void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan) {

@@ -7,7 +7,6 @@
 
 #include "apps/options/options.h"
 #include "apps/options/toml_file.h"
-#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -46,14 +45,7 @@ std::vector<std::string> withConfigFile(const CLI::App& verb, std::vector<std::s
   }
   if (!path) return arguments;
 
-  toml::table table;
-  try {
-    table = readToml(*path);
-  } catch (const toml::parse_error& error) {
-    refuse(*path, error.source().begin, std::string(error.description()));
-  } catch (const Error& error) {
-    throw CLI::ParseError(fmt::format("--config: {}", error.what()), CLI::ExitCodes::InvalidError);
-  }
+  const toml::table table = readToml("--config", *path);
 
   std::vector<std::string> names;
   for (const CLI::Option* option : verb.get_options())

@@ -18,7 +18,9 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
   app.add_option("input", a.input, "Mesh or level set (.vdb) to cut, or a folder of pieces to cut again.")
       ->required()
       ->type_name("FILE");
-  app.add_option("-o,--output", a.folder, "Folder for the pieces.")->required()->type_name("FOLDER");
+  markOutput(app.add_option("-o,--output", a.folder, "Folder for the pieces."), OutputTrial::verb)
+      ->required()
+      ->type_name("FOLDER");
 
   addPlanes(app, a.planes);
   auto* random =

@@ -7,6 +7,7 @@
 #include "nephele/levelset/cloud/attribute_field.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/shape/shapes.h"
@@ -101,7 +102,7 @@ ScalarField FieldSources::facing(const Vec3f& direction) {
 ScalarField FieldSources::mask(const FieldValue& value) {
   const VdbGrid grid = readScalarGrid(value.path, value.grid);
   const VdbGridInfo info = describe(grid);
-  const auto bricks = toBricks(grid);
+  const auto bricks = namingFile(value.path, [&] { return toBricks(grid); });
   const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
   const Box active = activeBox(info, bricks->indexToWorld()), common = active.intersection(box_);
   const std::string outside = fmt::format("; outside its grid it counts as {:g}",

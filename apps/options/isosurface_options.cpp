@@ -8,6 +8,7 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -37,13 +38,11 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
   const double level = isovalueOption->count() > 0 ? isovalue : isLevelSet ? 0.0 : 0.5;
   run.stats["mesh"] = {{"isovalue", level}};
 
-  Mesh mesh;
-  if (adaptivityOption->count() > 0) {
+  const Mesh mesh = namingFile(volume, [&] {
+    if (adaptivityOption->count() == 0) return marchingCubes(*toBricks(file), float(level), run);
     run.begin("adaptive mesh");
-    mesh = adaptiveMesh(*toBricks(file), level, adaptivity);
-  } else {
-    mesh = marchingCubes(*toBricks(file), float(level), run);
-  }
+    return adaptiveMesh(*toBricks(file), level, adaptivity);
+  });
   if (mesh.faceCount() == 0) refuseEmpty(volume, info, level);
   return mesh;
 }

@@ -204,15 +204,7 @@ void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, F
 }  // namespace
 
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
-  toml::table file;
-  try {
-    file = readToml(path);
-  } catch (const toml::parse_error& error) {
-    const auto line = error.source().begin.line;
-    throw CLI::ValidationError(
-        "--recipe",
-        fmt::format("{}: {}", line > 0 ? fmt::format("{}:{}", path, line) : path, error.description()));
-  }
+  const toml::table file = readToml("--recipe", path);
   std::vector<LayerRecipe> layers;
   for (const auto& [name, value] : file) {
     const Entry entry(path, std::string(name.str()), value);

@@ -174,13 +174,13 @@ void addSaid(CLI::App& app, LightOptions& options) {
       ->default_str("1,1,1");
 }
 
-void addFiles(CLI::App& app, const std::string& option, LightOptions::Said<std::string>& said,
-              const std::string& description) {
-  addRepeated(app, option, "[NAME=]FILE.exr", "[NAME=]FILE.exr", description,
-              [&said](const std::string& name, const std::string& text) {
-                said.emplace_back(name, text);
-                return text.ends_with(".exr");
-              });
+CLI::Option* addFiles(CLI::App& app, const std::string& option, LightOptions::Said<std::string>& said,
+                      const std::string& description) {
+  return addRepeated(app, option, "[NAME=]FILE.exr", "[NAME=]FILE.exr", description,
+                     [&said](const std::string& name, const std::string& text) {
+                       said.emplace_back(name, text);
+                       return text.ends_with(".exr");
+                     });
 }
 
 void addDeepShadows(CLI::App& app, LightOptions& options) {
@@ -276,8 +276,8 @@ void addLightOptions(CLI::App& app, LightOptions& options) {
 }
 
 void addShadowOutput(CLI::App& app, LightOptions& options) {
-  addFiles(app, "--write-deep-shadow", options.writtenShadows,
-           "Writes the deep shadow map of a light; without a name, of the only one.");
+  markOutput(addFiles(app, "--write-deep-shadow", options.writtenShadows,
+                      "Writes the deep shadow map of a light; without a name, of the only one."));
 }
 
 Lights LightOptions::resolved() const {

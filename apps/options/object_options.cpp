@@ -7,6 +7,7 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/base/error.h"
 #include "nephele/render/image/texture_image.h"
 
 namespace nephele::apps {
@@ -17,7 +18,7 @@ Mesh readObject(const std::string& path) {
   const VdbGrid grid = readScalarGrid(path);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
     throw Error(fmt::format("{}: grid '{}' is not a level set, which objects are", path, info.name));
-  return marchingCubes(*toBricks(grid));
+  return namingFile(path, [&] { return marchingCubes(*toBricks(grid)); });
 }
 
 bool hasCoordinates(const Mesh& mesh) {

@@ -170,7 +170,8 @@ CLI::Option* addCount(CLI::App& app, const std::string& name, int& target, int l
 }
 
 CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& target,
-                       const std::vector<std::string>& extensions, const std::string& description) {
+                       const std::vector<std::string>& extensions, const std::string& description,
+                       OutputTrial trial) {
   auto* option = app.add_option_function<std::string>(
       name,
       [&target, name, extensions](const std::string& text) {
@@ -186,7 +187,7 @@ CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& targ
       },
       description);
   option->type_name("FILE");
-  return option;
+  return markOutput(option, trial);
 }
 
 CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,

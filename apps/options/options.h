@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/options/outputs.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/math.h"
 
@@ -89,9 +90,10 @@ CLI::Option* addChoice(CLI::App& app, const std::string& name, T& target,
   option->type_name(words)->default_str(standard);
   return option;
 }
-/// The output file; `extensions` are the ones allowed ({".obj", ".ply"}).
+/// A file that the verb writes; `extensions` are the ones allowed ({".obj", ".ply"}).
 CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& target,
-                       const std::vector<std::string>& extensions, const std::string& description);
+                       const std::vector<std::string>& extensions, const std::string& description,
+                       OutputTrial trial = OutputTrial::program);
 
 /// A list of input files, each with the option in front.
 CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,

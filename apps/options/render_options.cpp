@@ -67,6 +67,16 @@ void addIntegrator(CLI::App& app, PictureOptions& options) {
            "Scatterings at which paths end, 0: never.");
 }
 
+/// Shorter steps than a thousandth of a voxel show nothing more, and rays of too many steps never end.
+float stepIn(const RenderVolume& volume, const Length& step) {
+  const double longest = double(volume.worldBounds().longestSide());
+  const double length = step.worldUnits(longest), shortest = double(volume.density().voxelSize()) / 1000;
+  if (!volume.isEmpty() && length < shortest * (1 - 1e-6))
+    refuseValue("--step", fmt::format("{:g}{}", step.value, step.relative ? "%" : ""),
+                fmt::format("at least {:.3g}, a thousandth of a voxel", shortest));
+  return float(length);
+}
+
 }  // namespace
 
 void addPictureOptions(CLI::App& app, PictureOptions& options) {
@@ -115,7 +125,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
   PictureOptions result = *this;
   result.extinction = extinction ? *extinction : defaultExtinction(volume);
   result.medium.extinction = *result.extinction;
-  if (step.value > 0) result.render.step = float(step.worldUnits(double(volume.worldBounds().longestSide())));
+  if (step.value > 0) result.render.step = stepIn(volume, step);
   if (adaptiveThreshold > 0 && pathTraced)
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);

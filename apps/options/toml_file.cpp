@@ -2,17 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
-
-#include "nephele/modeling/base/error.h"
+#include <string>
+#include <string_view>
 
 namespace nephele::apps {
 namespace {
 
 constexpr int kDeepest = 32;
+constexpr std::size_t kLargest = std::size_t(1) << 24;
 
 /// Passes over the text that begins with these quotes, and returns where it ends.
 std::size_t endOfText(const std::string& toml, std::size_t begin) {
@@ -30,7 +31,8 @@ std::size_t endOfText(const std::string& toml, std::size_t begin) {
   return toml.size();
 }
 
-void requireShallow(const std::string& path, const std::string& toml) {
+/// The line of a key that nests too deep, or 0.
+int lineOfDeepKey(const std::string& toml) {
   int line = 1, dots = 0;
   for (std::size_t i = 0; i < toml.size();) {
     const char c = toml[i];
@@ -45,23 +47,35 @@ void requireShallow(const std::string& path, const std::string& toml) {
       continue;
     }
     line += c == '\n';
-    dots = c == '.' ? dots + 1 : c == '\n' || c == ',' || c == '=' || c == '{' || c == '[' ? 0 : dots;
-    require(dots < kDeepest, fmt::format("{}:{}: a key nests more than {} deep", path, line, kDeepest));
+    dots = c == '.' ? dots + 1 : std::string_view("\n,={[").find(c) != std::string_view::npos ? 0 : dots;
+    if (dots >= kDeepest) return line;
     ++i;
   }
+  return 0;
 }
 
 }  // namespace
 
-toml::table readToml(const std::string& path) {
-  require(!std::filesystem::is_directory(path), path + ": is a folder, not a TOML file");
+toml::table readToml(const std::string& option, const std::string& path) {
+  if (std::filesystem::is_directory(path))
+    throw CLI::ValidationError(option, path + ": is a folder, not a TOML file");
   std::ifstream file(path, std::ios::binary);
-  require(file.good(), path + ": cannot be opened for reading");
-  std::ostringstream text;
-  text << file.rdbuf();
-  const std::string toml = text.str();
-  requireShallow(path, toml);
-  return toml::parse(toml, path);
+  if (!file.good()) throw CLI::ValidationError(option, path + ": cannot be opened for reading");
+  // No more than that is read of what has no end.
+  std::string toml(kLargest + 1, '\0');
+  file.read(toml.data(), std::streamsize(toml.size()));
+  toml.resize(std::size_t(file.gcount()));
+  if (toml.size() > kLargest)
+    throw CLI::ValidationError(option, fmt::format("{}: is larger than {} bytes", path, kLargest));
+  if (const int line = lineOfDeepKey(toml))
+    throw CLI::ValidationError(option,
+                               fmt::format("{}:{}: a key nests more than {} deep", path, line, kDeepest));
+  try {
+    return toml::parse(toml, path);
+  } catch (const toml::parse_error& error) {
+    throw CLI::ValidationError(
+        option, fmt::format("{}:{}: {}", path, error.source().begin.line, error.description()));
+  }
 }
 
 }  // namespace nephele::apps

@@ -7,8 +7,9 @@
 
 namespace nephele::apps {
 
-/// The whole file. @throws toml::parse_error @throws Error naming the file if it cannot be read, is a folder,
-/// or has keys that nest more than 32 deep, which toml++ would follow until the stack ends.
-toml::table readToml(const std::string& path);
+/// The whole file that `option` names.
+/// @throws CLI::ValidationError naming option, file and line where it is not TOML, cannot be read, is a
+/// folder, or has keys that nest more than 32 deep, which toml++ would follow until the stack ends.
+toml::table readToml(const std::string& option, const std::string& path);
 
 }  // namespace nephele::apps

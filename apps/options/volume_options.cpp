@@ -11,19 +11,6 @@
 namespace nephele::apps {
 namespace {
 
-// Brings errors that concern one file under its name.
-template <class Body>
-void naming(const std::string& path, Body&& body) {
-  try {
-    body();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    if (std::string_view(error.what()).starts_with(path)) throw;
-    throw Error(fmt::format("{}: {}", path, error.what()));
-  }
-}
-
 std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::string& grid, Run& run) {
   const VdbGrid vdb = readScalarGrid(path, grid);
   const VdbGridInfo info = describe(vdb);
@@ -150,11 +137,11 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   run.begin("read");
   std::vector<VolumePart> parts;
   for (std::size_t i = 0; i != paths.size(); ++i)
-    naming(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
+    namingFile(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
   run.requireMemory(estimateCombinedBytes(parts), "make the volumes with larger voxels");
   if (paths.size() > 1) return combine(parts, run);
   std::optional<RenderVolume> only;
-  naming(paths.front(), [&] { only.emplace(combine(parts, run)); });
+  namingFile(paths.front(), [&] { only.emplace(combine(parts, run)); });
   return *std::move(only);
 }
 

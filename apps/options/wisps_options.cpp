@@ -38,8 +38,8 @@ std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const G
   for (const std::string& repair : repaired.repairs) run.note(path + ": " + repair);
   const Box box = boundingBox(repaired.mesh);
   const double voxel = double(box.longestSide()) / kInsideResolution;
-  const ScalarField level = meshDistance(
-      repaired.mesh, {.voxelSize = voxel, .exteriorBand = 3 * voxel, .interiorBand = 3 * voxel}, run);
+  const MeshDistanceOptions band{.voxelSize = voxel, .exteriorBand = 3 * voxel, .interiorBand = 3 * voxel};
+  const ScalarField level = namingFile(path, [&] { return meshDistance(repaired.mesh, band, run); });
   return guidesInside(level, box, options);
 }
 

@@ -3,6 +3,7 @@
 #include "apps/app.h"
 #include "apps/options/advect_options.h"
 #include "nephele/levelset/flow/advection_files.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -22,7 +23,8 @@ void carry(const AdvectArguments& arguments, Run& run) {
   AdvectionOptions options = arguments.resolved();
   run.begin("read");
   run.expect(0, 0.05);
-  const CarriedGrids input = carriedGrids(readVdbFile(arguments.input));
+  const CarriedGrids input =
+      namingFile(arguments.input, [&] { return carriedGrids(readVdbFile(arguments.input)); });
   for (const std::string& grid : input.leftOut)
     run.note(
         fmt::format("{}: grid {} is left out: only numbers and vectors are carried", arguments.input, grid));

@@ -9,6 +9,7 @@
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/render/image/png_io.h"
+#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
@@ -18,29 +19,41 @@ Pieces cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Run&
     const MeshToLevelSetOptions options{.voxelSize = knives.voxelSize};
     run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
                       "use larger voxels (a lower --resolution or a larger --voxel-size)");
-    if (!part.level) try {
-        part.level = toBricks(meshToLevelSet(part.mesh, options, run));
-      } catch (const Cancelled&) {
-        throw;
-      } catch (const Error& error) {
-        throw Error(fmt::format("{}: {}", part.name, error.what()));
-      }
+    if (!part.level)
+      part.level = namingFile(part.name, [&] { return toBricks(meshToLevelSet(part.mesh, options, run)); });
   }
   return cutIntoLevelSets(parts, knives.voxelSize, knives.knives, knives.options, run);
 }
 
+/// Planes through a convex model part it into at most 1 + n + n over 2 + n over 3 pieces; random ones make
+/// two thirds of these.
+void requirePiecesMemory(const Knives& knives, std::size_t parts, const Run& run) {
+  constexpr double kBytesPerPiece = 7000, kMany = 2e4;
+  const auto n = double(knives.planes.size() + knives.rough.size());
+  const double most =
+      n + n * (n - 1) / 2 + n * (n - 1) * (n - 2) / 6 + double(knives.cells.size()) + double(parts);
+  if (most > kMany) run.note(fmt::format("{:g} knives: this may make up to {:.2g} pieces", n, most));
+  run.requireMemory(kBytesPerPiece * most, "use fewer knives");
+}
+
 void cut(const CutArguments& arguments, Run& run) {
   // Says now what could not be written in the end.
-  if (!arguments.preview.empty()) OutputFile{arguments.preview};
+  requireWritableFolder(arguments.folder);
+  if (!arguments.preview.empty())
+    run.requireMemory(estimateSurfacePictureBytes(arguments.picture.width, arguments.picture.height),
+                      "make the preview smaller (--size)");
   std::vector<CutPart> parts = arguments.readParts(run);
   // As long as the cut itself: on the side.
   auto crossings = std::async(std::launch::async, [mesh = arguments.isModel() ? parts[0].mesh : Mesh()] {
     return mesh.faceCount() > 0 ? countSelfIntersections(mesh).value_or(0) : 0;
   });
   const CutKnives knives = knivesOf(arguments, parts, run);
+  requirePiecesMemory(knives.knives, parts.size(), run);
   const bool isExact = arguments.geometry == CutArguments::Geometry::exact;
-  const Pieces pieces =
-      isExact ? cutIntoMeshes(parts, knives.knives, knives.options, run) : cutAsLevelSets(parts, knives, run);
+  const Pieces pieces = namingFile(arguments.input, [&] {
+    return isExact ? cutIntoMeshes(parts, knives.knives, knives.options, run)
+                   : cutAsLevelSets(parts, knives, run);
+  });
   if (pieces.pieces.empty())
     throw Error(fmt::format("no piece is left: all {} parts are smaller than --min-volume, {:g} together",
                             pieces.slivers, pieces.sliverVolume));

@@ -6,6 +6,7 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -45,7 +46,8 @@ void convert(const LevelsetOptions& options, Run& run) {
   RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, options.repair, run); });
   for (const std::string& repair : repaired.repairs) run.note(repair);
   if (options.subdivide > 0) {
-    repaired.mesh = subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run);
+    repaired.mesh = namingFile(
+        options.input, [&] { return subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run); });
     repaired.after = diagnose(repaired.mesh);
   }
 

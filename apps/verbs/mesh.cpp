@@ -7,6 +7,7 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -35,7 +36,9 @@ Mesh readInput(const MeshOptions& options, Run& run) {
 }
 
 void makeMesh(const MeshOptions& options, Run& run) {
-  const Mesh mesh = options.processing.processed(readInput(options, run), options.input, run);
+  const Mesh mesh = namingFile(options.input, [&] {
+    return options.processing.processed(readInput(options, run), options.input, run);
+  });
   run.begin("write");
   writeMesh(options.output, mesh);
 

@@ -46,7 +46,6 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
   if (!options.deep.empty()) picture.render.deep.emplace();
   if (!options.deep.empty() && picture.adaptiveThreshold > 0)
     refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
-  if (options.deep == options.output) refuseValue("--deep", options.deep, "another file than --output");
   if (!options.holdout.empty())
     picture.render.holdout = readHoldout(options.holdout, camera, run.memoryLimitBytes);
 }

@@ -15,6 +15,7 @@
 #include "nephele/modeling/field/space.h"
 #include "nephele/render/image/png_io.h"
 #include "nephele/render/image/texture_image.h"
+#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
@@ -53,6 +54,16 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
   writeMesh(arguments.warpedMesh, mesh);
 }
 
+void requirePictureMemory(const TransferArguments& arguments, const TextureBakeOptions& bake,
+                          const Run& run) {
+  if (!arguments.bakedTexture.empty())
+    run.requireMemory(estimateBakeBytes(bake.width, bake.height),
+                      "make the baked texture smaller (--bake-size)");
+  if (!arguments.preview.empty())
+    run.requireMemory(estimateSurfacePictureBytes(arguments.picture.width, arguments.picture.height),
+                      "make the preview smaller (--size)");
+}
+
 void transfer(const TransferArguments& arguments, Run& run) {
   run.begin("read");
   const Mesh reference = readShape(arguments.from, run);
@@ -60,20 +71,24 @@ void transfer(const TransferArguments& arguments, Run& run) {
   const TransferOptions options = arguments.chosen(reference, object, run);
   const auto texture =
       arguments.texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(arguments.texture));
+  const TextureBakeOptions bakeOptions = texture ? arguments.bakeOptions(*texture) : TextureBakeOptions{};
+  requirePictureMemory(arguments, bakeOptions, run);
 
   MeshWarpOptions warpOptions = arguments.warp;
   warpOptions.voxelSize = double(boundingBox(reference).longestSide()) / arguments.resolution;
-  const MeshWarp warp = warpMesh(triangulated(reference), triangulated(object), warpOptions, run);
-  const Mesh result =
-      options.names.empty() ? object : transferAttributes(reference, object, warp.images, options, run);
+  const std::string both = fmt::format("{} to {}", arguments.from, arguments.to);
+  const MeshWarp warp = namingFile(
+      both, [&] { return warpMesh(triangulated(reference), triangulated(object), warpOptions, run); });
+  const Mesh result = namingFile(both, [&] {
+    return options.names.empty() ? object : transferAttributes(reference, object, warp.images, options, run);
+  });
   run.begin("measure");
   const TransferQuality quality = transferQuality(reference, object, warp.images, run);
 
   writeWarp(arguments, reference, object, warpOptions, run);
   std::shared_ptr<const Image> baked;
   if (!arguments.bakedTexture.empty()) {
-    const BakedTexture bake =
-        bakeTexture(reference, *texture, object, warp.images, arguments.bakeOptions(*texture), run);
+    const BakedTexture bake = bakeTexture(reference, *texture, object, warp.images, bakeOptions, run);
     run.stats["texels_covered"] = bake.covered;
     baked = std::make_shared<const Image>(bake.image);
     writePng(arguments.bakedTexture, *baked, {.shoulder = 0.99999f}, run.metadata());

@@ -11,23 +11,26 @@ namespace {
 void bindOptions(CLI::App& app, TurntableOptions& options) {
   app.add_option("input", options.input, "Density to look at (.vdb, .nvdb).")->required()->type_name("FILE");
   addOutput(app, "-o,--output", options.output, {".exr"},
-            "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.")
+            "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.",
+            OutputTrial::verb)
       ->required();
   app.add_option("--frames", options.frames,
                  "Frames to make: 1-48, 1001-1100x2,1150. The turn takes from the first to the last of them.")
       ->required()
       ->type_name("FRAMES");
-  addOutput(app, "--preview", options.preview, {".png"}, "The same for the screen, named like the output.");
+  addOutput(app, "--preview", options.preview, {".png"}, "The same for the screen, named like the output.",
+            OutputTrial::verb);
   addNumber(app, "--turns", options.turns, -1000, 1000, "Turns from the first frame to the last.");
   addChoice<Orbit>(
       app, "--orbit", options.orbit,
       {{"camera", Orbit::camera}, {"model", Orbit::model}, {"light", Orbit::light}},
       "What turns: the camera around the cloud, the cloud before camera and lights, or the lights.");
   CLI::Option* movie = addOutput(app, "--movie", options.movie, {".mp4", ".mov", ".mkv"},
-                                 "Movie of all frames, H.264; needs the program ffmpeg.");
+                                 "Movie of all frames, H.264; needs the program ffmpeg.", OutputTrial::verb);
   addNumber(app, "--fps", options.movieOptions.framesPerSecond, 0.1, 1000, "Frames per second of the movie.")
       ->needs(movie);
-  addOutput(app, "--contact-sheet", options.contactSheet, {".png"}, "All frames, small, on one picture.");
+  addOutput(app, "--contact-sheet", options.contactSheet, {".png"}, "All frames, small, on one picture.",
+            OutputTrial::verb);
   app.add_flag("--skip-existing", options.skipExisting,
                "Keep the frames that are there and whole; without it all are made again.");
   app.add_option("--only", options.only, "Make only those of --frames that are in this range, too.")

@@ -1,6 +1,8 @@
 // The way from a mesh to a cloud: base distance, layers, density; each part lives in its own file.
 #include "nephele/levelset/cloud/cloud.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -15,6 +17,8 @@
 namespace nephele {
 
 namespace {
+
+constexpr float kFarthestVoxels = 1e5f;
 
 Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
   const VdbGrid grid = readScalarGrid(path);
@@ -85,10 +89,15 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
   const std::vector<CumuloLayer>& layers = options.layers;
   const float edge = thickestEdge(options) / 2;
+  const float reach = cumuloExteriorBand(layers, options.voxelSize, edge);
+  require(reach <= kFarthestVoxels * options.voxelSize,
+          fmt::format("the layers move the surface by up to {:.3g}, which is {:.3g} voxels, allowed: up to "
+                      "{:g}; use a smaller amplitude, a higher frequency or larger voxels",
+                      reach, reach / options.voxelSize, kFarthestVoxels));
   progress.begin("distance");
   const ScalarField base = meshDistance(mesh,
                                         {.voxelSize = baseVoxelSize(layers, options.voxelSize),
-                                         .exteriorBand = cumuloExteriorBand(layers, options.voxelSize, edge),
+                                         .exteriorBand = reach,
                                          .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)},
                                         progress);
   GriddedCumulo cumulo = griddedCumulo(base, layers,

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -361,7 +362,11 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
     // The band, and bricks that it only touches.
     const double width =
         double(reach) + (1 + double(detail::kOuterShare)) * margin + double(BrickGrid::kBrick) * voxel;
-    const double bricks = kGrowth * area * width / std::pow(double(BrickGrid::kBrick) * voxel, 3);
+    // Where layers reach farther than the shape is large, by Steiner's formula.
+    const double steiner =
+        area * width + std::numbers::pi * width * width * (double(box.longestSide()) + 4.0 / 3.0 * width);
+    const double bricks =
+        std::max(kGrowth * area * width, steiner) / std::pow(double(BrickGrid::kBrick) * voxel, 3);
     const LayerParts cut = detail::partsOf(box.expanded(displacementBound(layers) + margin), voxel,
                                            kLeastDilation + MedialSmoothingOptions{}.steps);
     // Of a layer in parts: three, of which one has neighbours around it.

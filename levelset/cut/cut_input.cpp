@@ -17,7 +17,7 @@ std::shared_ptr<const BrickGrid> readLevelSet(const std::string& path) {
   const VdbGrid grid = readScalarGrid(path);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
     throw Error(fmt::format("{}: grid '{}' is not a level set; make a mesh of it first", path, info.name));
-  return toBricks(grid);
+  return namingFile(path, [&] { return toBricks(grid); });
 }
 
 Mesh readSolid(const std::string& path, const MeshRepairOptions& repair, const Progress& progress) {
@@ -27,15 +27,9 @@ Mesh readSolid(const std::string& path, const MeshRepairOptions& repair, const P
     return surface;
   }
   const Mesh soup = readMesh(path);
-  try {
-    RepairedMesh repaired = repairMesh(soup, repair, progress);
-    for (const std::string& what : repaired.repairs) progress.note(fmt::format("{}: {}", path, what));
-    return std::move(repaired.mesh);
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", path, error.what()));
-  }
+  RepairedMesh repaired = namingFile(path, [&] { return repairMesh(soup, repair, progress); });
+  for (const std::string& what : repaired.repairs) progress.note(fmt::format("{}: {}", path, what));
+  return std::move(repaired.mesh);
 }
 
 std::vector<Vec3f> scatteredPoints(std::span<const CutPart> parts, int count, std::uint32_t seed) {

@@ -325,6 +325,12 @@ std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptio
   return PieceWriter(pieces, options).write(progress);
 }
 
+void requireWritableFolder(const std::string& folder) {
+  PieceFolder trial(folder);
+  trial.expect({PieceFolder::kList});
+  trial.temporary(0);
+}
+
 std::vector<CutPart> readPieces(const std::string& folder, const Progress& progress) {
   struct Entry {
     fs::path file;

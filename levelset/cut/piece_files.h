@@ -42,6 +42,9 @@ std::vector<Vec3d> explodedOffsets(const Pieces& pieces, double explode);
 std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptions& options,
                                      const Progress& progress = silent());
 
+/// @throws Error naming the path if `writePieces` could not make the folder or write to it.
+void requireWritableFolder(const std::string& folder);
+
 /// The pieces that a folder holds, as parts for another cut: those that its pieces.json lists, or all its
 /// meshes if it has none, by name.
 /// @throws Error naming the path: no folder, no meshes, or one that is listed but not there.

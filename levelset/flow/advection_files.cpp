@@ -161,7 +161,9 @@ VectorField readVelocity(const std::string& path, const std::string& name) {
   }
   const std::array<VdbGrid, 3> parts = readVectorGrid(path, wanted);
   VectorGrids grids;
-  for (std::size_t c = 0; c < 3; ++c) grids[c] = toBricks(parts[c]);
+  namingFile(path, [&] {
+    for (std::size_t c = 0; c < 3; ++c) grids[c] = toBricks(parts[c]);
+  });
   return gridField(std::move(grids), Interpolation::trilinear);
 }
 

@@ -28,19 +28,23 @@ using openvdb::FloatTree;
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kWidth = BrickGrid::kWidth;
+constexpr double kMostInTiles = 1e8;
 
 Vec3i brickOf(const openvdb::Coord& c) {
   return {c.x() >> 3, c.y() >> 3, c.z() >> 3};
 }
 
 /// visitTile(first brick, bricks along an axis, value), for all tiles that are not background, and
-/// visitLeaf(brick, leaf).
+/// visitLeaf(brick, leaf). Inactive tiles are the inside of level sets, and in fog they are nothing.
 template <class VisitTile, class VisitLeaf>
-void forEachPart(const FloatTree& tree, const VisitTile& visitTile, const VisitLeaf& visitLeaf) {
+void forEachPart(const openvdb::FloatGrid& grid, const VisitTile& visitTile, const VisitLeaf& visitLeaf) {
+  const FloatTree& tree = grid.tree();
   const float background = tree.background();
+  const bool isFog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
   const auto visitTiles = [&](const auto& node, int span) {
     for (auto tile = node.cbeginValueAll(); tile; ++tile)
-      if (*tile != background) visitTile(brickOf(tile.getCoord()), span, *tile);
+      if (*tile != background && (tile.isValueOn() || !isFog))
+        visitTile(brickOf(tile.getCoord()), span, *tile);
   };
   for (auto upper = tree.root().cbeginChildOn(); upper; ++upper) {
     visitTiles(*upper, 16);
@@ -52,8 +56,9 @@ void forEachPart(const FloatTree& tree, const VisitTile& visitTile, const VisitL
   visitTiles(tree.root(), 512);
 }
 
-/// What stands at each brick position of a tree.
-BlockTable blocksOf(const FloatTree& tree, const std::string& name) {
+/// What stands at each brick position of a grid.
+BlockTable blocksOf(const openvdb::FloatGrid& grid, const std::string& name) {
+  const FloatTree& tree = grid.tree();
   BlockTable result;
   result.order = BlockTable::Order::zFastest;
   require(std::isfinite(tree.background()),
@@ -66,7 +71,7 @@ BlockTable blocksOf(const FloatTree& tree, const std::string& name) {
     last = max(last, low + Vec3i{span - 1, span - 1, span - 1});
   };
   forEachPart(
-      tree, [&](const Vec3i& low, int span, float) { include(low, span); },
+      grid, [&](const Vec3i& low, int span, float) { include(low, span); },
       [&](const Vec3i& brick, const auto& leaf) {
         include(brick, 1);
         result.blocks.push_back(leaf.buffer().data());
@@ -89,7 +94,7 @@ BlockTable blocksOf(const FloatTree& tree, const std::string& name) {
   float lastValue = tree.background();
   std::int32_t lastCode = 0;
   forEachPart(
-      tree,
+      grid,
       [&](const Vec3i& low, int span, float value) {
         if (value != lastValue) {
           lastValue = value;
@@ -243,7 +248,7 @@ openvdb::math::Transform::Ptr transformOf(const Lattice& lattice, double voxelSi
 
 std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign) {
   const std::string name = displayName(grid);
-  BlockTable blocks = blocksOf(grid.tree(), name);
+  BlockTable blocks = blocksOf(grid, name);
   blocks.sign = sign;
   const Lattice lattice = latticeOf(grid);
   if (const BrickBox& box = blocks.codes.box; box.size() > 0)
@@ -254,7 +259,7 @@ std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign) 
 VoxelGrid<float> voxelsOf(const openvdb::FloatGrid& grid, double voxelSize, const Vec3i& origin, float sign) {
   VoxelGrid<float> result(displayName(grid), voxelSize, sign * grid.background());
   forEachPart(
-      grid.tree(),
+      grid,
       [&](const Vec3i& low, int span, float value) {
         for (int z = 0; z < span; ++z)
           for (int y = 0; y < span; ++y)
@@ -274,6 +279,11 @@ VoxelGrid<Vec3f> voxelsOf(const openvdb::Vec3SGrid& grid) {
   const std::string name = displayName(grid);
   const openvdb::Vec3s& background = grid.background();
   VoxelGrid<Vec3f> result(name, latticeOf(grid), Vec3f{background.x(), background.y(), background.z()});
+  const auto inTiles = double(grid.activeVoxelCount() - grid.tree().activeLeafVoxelCount());
+  require(inTiles <= kMostInTiles,
+          fmt::format("grid {} has tiles of {:.3g} voxels, which are held one by one in grids of vectors; "
+                      "allowed: up to {:.3g}",
+                      name, inTiles, kMostInTiles));
   // A copy, for tiles become leaves.
   const auto whole = grid.deepCopy();
   whole->tree().voxelizeActiveTiles();

@@ -36,7 +36,8 @@ std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign);
 /// `voxelSize`.
 VoxelGrid<float> voxelsOf(const openvdb::FloatGrid& grid, double voxelSize, const Vec3i& origin, float sign);
 /// The leaves of a grid of vectors, tiles of active voxels among them; what is not active is background.
-/// @throws Error naming the grid if a value is not finite.
+/// @throws Error naming the grid if a value is not finite or its tiles are too large to be held voxel by
+/// voxel.
 VoxelGrid<Vec3f> voxelsOf(const openvdb::Vec3SGrid& grid);
 
 /// How values of ours become values of a tree, and which of those are active.

@@ -15,12 +15,15 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <system_error>
 
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {
 namespace {
+
+namespace fs = std::filesystem;
 
 enum class State { free, open, busy, discarded };
 
@@ -66,14 +69,44 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
+void copyInto(const std::string& stream, const std::string& from) {
+  std::ifstream in(from, std::ios::binary);
+  std::ofstream out(stream, std::ios::binary | std::ios::app);
+  if (in.peek() != std::ifstream::traits_type::eof()) out << in.rdbuf();
+  out.close();
+  if (!in || !out) throw Error(fmt::format("cannot write {}: {}", stream, reason(errno)));
+}
+
 }  // namespace
 
-OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
-  namespace fs = std::filesystem;
-  require(!path_.empty(), "output: the file name is empty");
-  const fs::path target(path_);
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+std::string outputTarget(const std::string& path) {
+  constexpr int kMostLinks = 40;
+  fs::path target = path;
+  std::error_code error;
+  for (int i = 0; i != kMostLinks && fs::is_symlink(target, error); ++i) {
+    const fs::path next = fs::read_symlink(target, error);
+    if (error) break;
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target.string();
+}
+
+bool isStream(const std::string& path) {
   std::error_code ignored;
+  const fs::file_status status = fs::status(path, ignored);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+OutputFile::OutputFile(std::string path)
+    : path_(std::move(path)), target_(outputTarget(path_)), isStream_(isStream(path_)) {
+  require(!path_.empty(), "output: the file name is empty");
+  const fs::path target(isStream_ ? path_ : target_);
+  const fs::path folder = isStream_                  ? fs::temp_directory_path()
+                          : target.has_parent_path() ? target.parent_path()
+                                                     : fs::path(".");
+  std::error_code ignored;
+  require(!fs::is_symlink(target_, ignored) || isStream_,
+          fmt::format("cannot write {}: its symbolic links lead round in a circle", path_));
   require(target.has_filename() && !fs::is_directory(target, ignored),
           fmt::format("cannot write {}: it is a folder", path_));
   require(fs::exists(folder, ignored),
@@ -107,17 +140,25 @@ OutputFile::~OutputFile() {
 
 void OutputFile::commit() {
   require(!committed_, fmt::format("{} is already written", path_));
-  if (std::rename(temporary_.c_str(), path_.c_str()) != 0)
+  if (isStream_) {
+    copyInto(path_, temporary_);
+    ::unlink(temporary_.c_str());
+  } else if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
     throw Error(fmt::format("cannot write {}: {}", path_, reason(errno)));
+  }
   committed_ = true;
   strike(entry_);
+}
+
+void OutputFile::withdraw() noexcept {
+  if (committed_ && !isStream_) ::unlink(target_.c_str());
 }
 
 void commitTogether(std::span<OutputFile* const> outputs) {
   for (std::size_t i = 0; i != outputs.size(); ++i) try {
       outputs[i]->commit();
     } catch (const Error&) {
-      for (OutputFile* before : outputs.first(i)) ::unlink(before->path().c_str());
+      for (OutputFile* before : outputs.first(i)) before->withdraw();
       throw;
     }
 }

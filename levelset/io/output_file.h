@@ -5,8 +5,14 @@
 
 namespace nephele {
 
+/// The file that writing to `path` is about: where a symbolic link leads, or `path` itself.
+std::string outputTarget(const std::string& path);
+
+/// Whether `path` is something that bytes go into and that must not be replaced: a device, a pipe, a socket.
+bool isStream(const std::string& path);
+
 /// An output that appears whole or not at all: written under a temporary name in the target's folder, then
-/// renamed.
+/// renamed. Symbolic links stay and what they lead to is written; streams get the bytes on commit.
 ///
 /// The destructor removes the temporary unless `commit` was called. `discardAllOutputs` removes those of a
 /// process that is being killed.
@@ -26,8 +32,13 @@ class OutputFile {
   /// Renames the temporary to the target. @throws Error naming the path.
   void commit();
 
+  /// Removes the target again, if it is a file.
+  void withdraw() noexcept;
+
  private:
   std::string path_;
+  std::string target_;
+  bool isStream_;
   std::string temporary_;
   void* entry_ = nullptr;  // where discardAllOutputs finds the temporary
   bool committed_ = false;

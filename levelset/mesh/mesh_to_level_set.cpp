@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "nephele/levelset/mesh/mesh_band.h"
@@ -96,16 +97,22 @@ double enclosedVolume(const VoxelGrid<float>& levelSet) {
 
 double estimateLevelSetBytes(const Mesh& mesh, const MeshToLevelSetOptions& options) {
   requireValid(mesh);
-  // Bricks that a slab of the band's width touches, by area; per brick its samples, its leaf and the
-  // triangles near it.
-  constexpr double kBrickBytes = 9000.0;
+  // Per brick near the surface its samples, its leaf and the triangles near it; per brick far from it,
+  // samples.
+  constexpr double kBrickBytes = 9000.0, kFarBrickBytes = 2600.0;
   constexpr double kTableBytes = 12.0;
   const double brick = BrickGrid::kBrick * options.voxelSize;
   const Vec3d size = Vec3d(boundingBox(mesh).size()) / brick;
-  const double bandBricks = 2.0 * (options.halfWidthVoxels + BrickGrid::kBrick) / BrickGrid::kBrick;
+  const double reach = (options.halfWidthVoxels + BrickGrid::kBrick) / BrickGrid::kBrick;
+  const double bandBricks = 2.0 * reach;
+  // Steiner's formula, the mean width being that of the box's diagonal, as a slender body has it.
   const double bricks = surfaceArea(mesh) / (brick * brick) * bandBricks;
+  // What a band wider than its shape has beside it by Steiner's formula, the mean width being at most the
+  // diagonal.
+  const double far = std::numbers::pi * reach * reach * (length(size) + 4.0 / 3.0 * reach);
   const double table = (size.x + bandBricks) * (size.y + bandBricks) * (size.z + bandBricks);
-  return std::min(bricks, table) * kBrickBytes + table * kTableBytes + 100.0 * double(mesh.corners.size());
+  return std::min(bricks, table) * kBrickBytes + std::min(far, table) * kFarBrickBytes + table * kTableBytes +
+         100.0 * double(mesh.corners.size());
 }
 
 VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,

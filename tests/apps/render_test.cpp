@@ -145,6 +145,8 @@ TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
                {"--ground=-1", "--ground"},
                {"--step 0", "--step"},
                {"--step -1", "--step"},
+               {"--step 1e-20", "--step"},
+               {"--step 1e-10%", "--step"},
                {"--adaptive 1.5", "--adaptive"},
                {"--adaptive nan", "--adaptive"},
                {"--adaptive 0.1 --integrator path", "--adaptive"},

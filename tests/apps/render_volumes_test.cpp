@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -147,6 +148,80 @@ TEST(RenderBadInput, ACameraInTheCloudSeesCloud) {
   const Image image = readImage(folder.file("a.exr"));
   for (const float alpha : image.channel("A").values) EXPECT_GT(alpha, 0.99f);
   for (const float red : image.channel("R").values) EXPECT_TRUE(std::isfinite(red) && red >= 0);
+}
+
+// A million voxels away: a table of all between would not be held.
+TEST(RenderBadInput, InactiveTilesOfFogAreNothing) {
+  const TemporaryFolder folder;
+  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid& grid) {
+    grid.setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid.tree().root().addTile({1 << 20, 1 << 20, 1 << 20}, 1.0f, false);
+  });
+  ASSERT_EQ(
+      runProgram("render " + path + " -o " + folder.file("far.exr") + " --size 16x12 --samples 1").exitCode,
+      0);
+  writeBall(folder, 0, [](openvdb::FloatGrid&) {});
+  ASSERT_EQ(
+      runProgram("render " + path + " -o " + folder.file("ball.exr") + " --size 16x12 --samples 1").exitCode,
+      0);
+  EXPECT_EQ(readImage(folder.file("far.exr")).channel("R").values,
+            readImage(folder.file("ball.exr")).channel("R").values);
+}
+
+TEST(RenderBadInput, CamerasFarAwaySeeNothing) {
+  const TemporaryFolder folder;
+  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid&) {});
+  const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr") +
+                                          " --size 16x12 --camera-position 0,3e9,9 --look-at 0,3e9,0");
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Image image = readImage(folder.file("a.exr"));
+  for (const float alpha : image.channel("A").values) EXPECT_EQ(alpha, 0.0f);
+}
+
+void writeMovingBall(const std::string& path, float speed, bool hasTile) {
+  openvdb::initialize();
+  auto density = openvdb::FloatGrid::create(0);
+  density->setName("density");
+  density->fill(openvdb::CoordBBox({-6, -6, -6}, {6, 6, 6}), 1.0f);
+  auto velocity = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
+  velocity->setName("v");
+  velocity->fill(openvdb::CoordBBox({-6, -6, -6}, {6, 6, 6}), openvdb::Vec3s(speed, 0, 0));
+  if (hasTile) velocity->tree().root().addTile({1 << 20, 0, 0}, openvdb::Vec3s(speed, 0, 0), true);
+  for (const openvdb::GridBase::Ptr& grid :
+       {openvdb::GridBase::Ptr(density), openvdb::GridBase::Ptr(velocity)})
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+  openvdb::io::File file(path);
+  file.write({density, velocity});
+  file.close();
+}
+
+// All of a ball goes one way, so that a bound with the wrong sign would leave out all of its trail.
+TEST(RenderMotion, ANegativeScaleOfVelocitiesIsTheOtherWay) {
+  const TemporaryFolder folder;
+  const std::string options =
+      " --velocity-grid v --shutter 0,1 --camera-position 0,0,9 --look-at 0,0,0 "
+      "--size 48x16 --samples 4 --velocity-scale ";
+  writeMovingBall(folder.file("there.vdb"), 2, false);
+  writeMovingBall(folder.file("back.vdb"), -2, false);
+  for (const auto& [name, scale] : {std::pair{"there", " -1"}, {"back", " 1"}}) {
+    const ProgramResult result = runProgram("render " + folder.file(name + std::string(".vdb")) + " -o " +
+                                            folder.file(name + std::string(".exr")) + options + scale);
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+  }
+  const Image there = readImage(folder.file("there.exr")), back = readImage(folder.file("back.exr"));
+  EXPECT_EQ(there.channel("A").values, back.channel("A").values);
+  EXPECT_GT(*std::ranges::max_element(there.channel("A").values), 0.5f);
+}
+
+TEST(RenderMotion, VelocityTilesThatCannotBeHeldAreRefused) {
+  const TemporaryFolder folder;
+  writeMovingBall(folder.file("tile.vdb"), 2, true);
+  const ProgramResult result =
+      runProgram("advect " + folder.file("tile.vdb") + " -o " + folder.file("a.vdb") + " --velocity " +
+                 folder.file("tile.vdb") + " --velocity-grid v");
+  EXPECT_EQ(result.exitCode, 1) << result.errors;
+  EXPECT_NE(result.errors.find("tile.vdb"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("more than can be held"), std::string::npos) << result.errors;
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 // that the next one knows what is its own and what is the user's.
 #include "nephele/levelset/cut/detail/piece_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -39,6 +41,25 @@ std::vector<std::string> filesListed(const std::string& path) {
     }
   return files;
 }
+
+/// Keeps other cuts from putting files into the folder as long as it lives.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::string& path)
+      : descriptor_(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    // File systems that know no locks are written to without one.
+    while (descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
+  ~FolderLock() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
 
 }  // namespace
 
@@ -104,8 +125,11 @@ void PieceFolder::expect(const std::vector<std::string>& names) {
   names_ = names;
   outputs_.resize(names.size());
   openFiles_.resize(names.size());
-  if (!staging_.empty()) return;
-  const std::set<std::string> listed(listed_.begin(), listed_.end()), wanted(names.begin(), names.end());
+  if (staging_.empty()) requireNoneInTheWay();
+}
+
+void PieceFolder::requireNoneInTheWay() const {
+  const std::set<std::string> listed(listed_.begin(), listed_.end()), wanted(names_.begin(), names_.end());
   for (const auto& entry : fs::directory_iterator(path_)) {
     const std::string name = entry.path().filename().string();
     const std::string extension = entry.path().extension().string();
@@ -131,11 +155,16 @@ void PieceFolder::commit() {
   std::error_code ignored;
   if (!staging_.empty()) {
     if (std::rename(staging_.c_str(), target_.c_str()) != 0)
-      throw Error(
-          fmt::format("cannot make the folder {}: {}", path_, std::generic_category().message(errno)));
+      throw Error(fmt::format("cannot make the folder {}: {}", path_,
+                              errno == ENOTEMPTY || errno == EEXIST
+                                  ? "another run has made it meanwhile"
+                                  : std::generic_category().message(errno)));
     committed_ = true;
     return;
   }
+  const FolderLock lock(path_);
+  if (fs::exists(pathOf(kList), ignored)) listed_ = filesListed(pathOf(kList));
+  requireNoneInTheWay();
   // While its files go, the old list still names them, so that what is missing is missed. (Some file systems
   // wait for the disk where a file is replaced, not where one is new.)
   for (const std::string& file : listed_)

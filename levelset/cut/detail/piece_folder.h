@@ -26,7 +26,8 @@ class PieceFolder {
   /// Where to write the file of that index; it may be there, empty. Safe to call from many threads, once for
   /// each.
   std::string temporary(std::size_t index);
-  /// Removes what the folder's old list names, and puts the new files in place.
+  /// Removes what the folder's list names by now, and puts the new files in place: of two runs that end at
+  /// once the files of one stay. @throws Error naming the path.
   void commit();
 
   /// Where the list is.
@@ -35,6 +36,7 @@ class PieceFolder {
  private:
   std::string pathOf(const std::string& name) const;
   void makeFolder();
+  void requireNoneInTheWay() const;
 
   std::string path_, target_;
   /// What the folder is called until it is complete; empty if it was there.

@@ -1,5 +1,6 @@
 #include "nephele/levelset/io/output_file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -66,6 +67,48 @@ TEST(OutputFile, TwoOutputsOfOneNameDoNotShareATemporary) {
   const TemporaryFolder folder;
   const OutputFile a(folder.file("a.obj")), b(folder.file("a.obj"));
   EXPECT_NE(a.temporaryPath(), b.temporaryPath());
+}
+
+TEST(OutputFile, KeepsASymbolicLinkAndWritesWhatItLeadsTo) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  fs::create_directory(folder.file("store"));
+  fs::create_symlink("store/real.obj", folder.file("a.obj"));
+  for (const std::string text : {"first", "second"}) {
+    OutputFile output(folder.file("a.obj"));
+    EXPECT_EQ(fs::path(output.temporaryPath()).parent_path().string(), folder.file("store"))
+        << "renaming needs the folder of what the link leads to";
+    write(output.temporaryPath(), text);
+    output.commit();
+    EXPECT_TRUE(fs::is_symlink(folder.file("a.obj")));
+    EXPECT_EQ(textOf(folder.file("store/real.obj")), text);
+  }
+  fs::create_symlink("round.obj", folder.file("round.obj"));
+  EXPECT_NE(messageOf([&] { const OutputFile output(folder.file("round.obj")); }).find("circle"),
+            std::string::npos);
+}
+
+// A named pipe stands in for devices: it, too, takes bytes and must not be replaced by a file.
+TEST(OutputFile, WritesIntoAStreamAndLeavesItThere) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder.file("pipe.obj");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  // Both ends in one process: nobody waits.
+  const int reader = ::open(pipe.c_str(), O_RDWR | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  EXPECT_TRUE(isStream(pipe));
+  OutputFile output(pipe);
+  write(output.temporaryPath(), "bytes");
+  output.commit();
+  output.withdraw();
+  char text[16] = {};
+  EXPECT_EQ(::read(reader, text, sizeof(text)), 5);
+  EXPECT_STREQ(text, "bytes");
+  ::close(reader);
+  EXPECT_TRUE(isStream(pipe)) << "neither replaced nor removed";
+  EXPECT_FALSE(std::filesystem::exists(output.temporaryPath()));
+  EXPECT_FALSE(isStream(folder.file("none"))) << "what is not there";
+  EXPECT_FALSE(isStream(folder.file("")));
 }
 
 TEST(OutputFile, HasTheUsualPermissions) {
