@@ -14,6 +14,7 @@
 #include "apps/detail/program_run.h"
 #include "apps/options/config_file.h"
 #include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::apps {
 namespace {
@@ -63,7 +64,8 @@ void addCommonOptions(CLI::App& app, CommonOptions& options) {
 void writeStatistics(const std::string& path, const nlohmann::json& statistics) {
   OutputFile output(path);
   std::ofstream file(output.temporaryPath());
-  file << statistics.dump(2) << '\n';
+  // Names may be in any encoding, but JSON is UTF-8.
+  file << statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   file.close();
   require(file.good(), fmt::format("{}: could not be written", path));
   output.commit();
@@ -79,8 +81,20 @@ std::vector<std::string> optionNames(const CLI::App& app) {
   return names;
 }
 
+/// Lines stay lines; what else a file may have in its names does not reach the terminal.
+void printError(const std::string& who, std::string_view what) {
+  std::string text;
+  for (std::size_t begin = 0; begin <= what.size();) {
+    const std::size_t end = std::min(what.find('\n', begin), what.size());
+    text += (begin > 0 ? "\n" : "") + printable(what.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  std::cerr << who << ": error: " << text << '\n';
+}
+
 int usageError(const std::string& who, const std::string& what) {
-  std::cerr << who << ": error: " << what << "\nTry '" << who << " --help'.\n";
+  printError(who, what);
+  std::cerr << "Try '" << who << " --help'.\n";
   return kUsage;
 }
 
@@ -106,7 +120,7 @@ int runBody(const Verb& verb, CLI::App& app, ProgramRun& run, const CommonOption
     std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
   } catch (const std::exception& error) {
     run.finish();
-    std::cerr << who << ": error: " << error.what() << '\n';
+    printError(who, error.what());
   }
   return kFailed;
 }

@@ -10,6 +10,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/system.h"
 
 namespace nephele::apps {
@@ -168,7 +169,7 @@ void ProgramRun::note(std::string_view message) const {
   if (options_.quiet) return;
   const std::lock_guard lock(mutex_);
   clearBar();
-  say("nephele {}: {}\n", verb_, message);
+  say("nephele {}: {}\n", verb_, printable(message));
 }
 
 void ProgramRun::detail(std::string_view message) const {
@@ -183,7 +184,8 @@ void ProgramRun::result(const std::string& line) const {
   if (options_.quiet) return;
   const std::lock_guard lock(mutex_);
   clearBar();
-  fmt::print("{}\n", line);
+  const std::string text = printable(line) + '\n';
+  std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
 void ProgramRun::finish() const {

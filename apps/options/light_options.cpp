@@ -280,7 +280,7 @@ void addShadowOutput(CLI::App& app, LightOptions& options) {
                       "Writes the deep shadow map of a light; without a name, of the only one."));
 }
 
-Lights LightOptions::resolved() const {
+Lights LightOptions::resolved(double mostBytes) const {
   Lights result = lights;
   if (noSun) result.suns.clear();
   if (!noSun && result.suns.empty() && result.locals.empty() && skyFile.empty())
@@ -303,7 +303,7 @@ Lights LightOptions::resolved() const {
     forLights("--read-deep-shadow", name, result, [&](auto& light) { light.deepShadow = map; });
   }
   if (!skyFile.empty()) {
-    result.map = std::make_shared<const Environment>(Environment::read(skyFile, sky));
+    result.map = std::make_shared<const Environment>(Environment::read(skyFile, sky, mostBytes));
     result.sky = {};
   }
   result.check();

@@ -61,9 +61,10 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
       ->default_str("0.3,0.3,0.3");
 }
 
-std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume) const {
+std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, double mostBytes) const {
   std::vector<SurfaceObject> all;
-  const auto image = texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(texture));
+  const auto image =
+      texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(texture, mostBytes));
   for (const std::string& path : objects) {
     SurfaceObject object{readObject(path), colour, checkers, image};
     if ((checkers > 0 || image) && !hasCoordinates(object.mesh))
@@ -82,8 +83,8 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
   return all.empty() ? nullptr : std::make_shared<const Surfaces>(std::move(all));
 }
 
-void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume) const {
-  picture.render.surfaces = surfaces(volume);
+void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const {
+  picture.render.surfaces = surfaces(volume, mostBytes);
   if (picture.pathTraced && picture.render.surfaces)
     refuseValue("--integrator", "path", "march, where there are objects");
 }

@@ -24,9 +24,9 @@ struct ObjectOptions {
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
 
   /// Reads the files; null where there are no objects. @throws Error naming the file.
-  std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume) const;
+  std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, double mostBytes) const;
   /// Puts them into `picture`. @throws Error as `surfaces`, CLI::Error if it is to be path traced.
-  void addTo(PictureOptions& picture, const RenderVolume& volume) const;
+  void addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const;
 };
 
 /// Declares the options on `app`.

@@ -121,7 +121,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->default_str("the sky's");
 }
 
-PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
+PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostBytes) const {
   PictureOptions result = *this;
   result.extinction = extinction ? *extinction : defaultExtinction(volume);
   result.medium.extinction = *result.extinction;
@@ -129,7 +129,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume) const {
   if (adaptiveThreshold > 0 && pathTraced)
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
-  result.lights = light.resolved();
+  result.lights = light.resolved(mostBytes);
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");

@@ -36,7 +36,7 @@ struct PictureOptions : CameraOptions {
   std::optional<Vec3f> background;
 
   /// These options with everything filled in that follows from `volume`.
-  PictureOptions resolved(const RenderVolume& volume) const;
+  PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
   /// `render` with the rays per pixel that suit `camera`, unless they were given.
   RenderOptions marched(const Camera& camera) const;
   /// Marches or path traces; `resolved` comes first.

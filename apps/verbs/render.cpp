@@ -42,7 +42,7 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
   if (picture.pathTraced && !(options.deep.empty() && options.holdout.empty()))
     refuseValue(options.deep.empty() ? "--holdout" : "--deep",
                 options.deep.empty() ? options.holdout : options.deep, "--integrator march");
-  options.objects.addTo(picture, volume);
+  options.objects.addTo(picture, volume, run.memoryLimitBytes);
   if (!options.deep.empty()) picture.render.deep.emplace();
   if (!options.deep.empty() && picture.adaptiveThreshold > 0)
     refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
@@ -54,7 +54,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   const RenderVolume volume =
       readVolumes(options.inputs, options.picture.volumes, options.picture.shutter, run);
   if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
-  PictureOptions picture = options.picture.resolved(volume);
+  PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   const Camera camera = picture.camera(volume);
   addOthers(options, volume, camera, picture, run);
   run.requireMemory(

@@ -70,7 +70,9 @@ void transfer(const TransferArguments& arguments, Run& run) {
   const Mesh object = subdividedAsAsked(readShape(arguments.to, run), arguments.subdivide, run);
   const TransferOptions options = arguments.chosen(reference, object, run);
   const auto texture =
-      arguments.texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(arguments.texture));
+      arguments.texture.empty()
+          ? nullptr
+          : std::make_shared<const Image>(readTexture(arguments.texture, run.memoryLimitBytes));
   const TextureBakeOptions bakeOptions = texture ? arguments.bakeOptions(*texture) : TextureBakeOptions{};
   requirePictureMemory(arguments, bakeOptions, run);
 

@@ -65,8 +65,8 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   const RenderVolume volume =
       readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
-  PictureOptions picture = options.picture.resolved(volume);
-  options.objects.addTo(picture, volume);
+  PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
+  options.objects.addTo(picture, volume, run.memoryLimitBytes);
   const Camera start = firstCamera(options, picture, volume);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.

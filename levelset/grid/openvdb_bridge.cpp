@@ -19,6 +19,7 @@
 #include "nephele/levelset/grid/detail/block_table.h"
 #include "nephele/levelset/grid/openvdb_assembly.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::detail {
 
@@ -204,7 +205,7 @@ void initializeOpenVdb() {
 }
 
 std::string displayName(const std::string& name) {
-  return name.empty() ? "without a name" : "'" + name + "'";
+  return name.empty() ? "without a name" : "'" + printable(name, 80) + "'";
 }
 
 std::string displayName(const openvdb::GridBase& grid) {

@@ -63,6 +63,8 @@ std::string readWholeFile(const std::string& path) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) throw failed(errno);
   if (S_ISDIR(status.st_mode)) throw failed(EISDIR);
+  // Devices need not end, as pipes do.
+  require(!S_ISCHR(status.st_mode) && !S_ISBLK(status.st_mode), path + ": is a device, not a file");
   std::string content;
   content.resize(static_cast<std::size_t>(std::max<off_t>(status.st_size, 0)) + 1);
   std::size_t size = 0;

@@ -12,6 +12,7 @@
 #include "nephele/levelset/io/detail/gltf_document.h"
 #include "nephele/levelset/io/detail/mesh_io_private.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::detail {
 namespace {
@@ -227,13 +228,7 @@ Mesh readGltf(const MeshFile& file) {
   try {
     return GltfReader(file).read();
   } catch (const json::exception& error) {
-    // nlohmann's text reads "[json.exception.type_error.302] what happened".
-    const std::string_view text = error.what();
-    const std::size_t start = text.find("] ");
-    std::string what(start == std::string_view::npos ? text : text.substr(start + 2));
-    for (char& c : what) c = c >= ' ' && c <= '~' ? c : '?';
-    if (what.size() > 160) what = what.substr(0, 157) + "...";
-    file.fail("the JSON part is broken: " + what);
+    file.fail("the JSON part is broken: " + jsonFault(error.what()));
   }
 }
 

@@ -13,9 +13,9 @@
 #include <array>
 
 #include "nephele/levelset/io/detail/blosc_header.h"
-#include "nephele/levelset/io/detail/file_bytes.h"
 #include "nephele/levelset/io/detail/nano_nodes.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/io/file_bytes.h"
 
 namespace nephele::detail {
 

@@ -12,9 +12,9 @@
 #include <istream>
 #include <vector>
 
-#include "nephele/levelset/io/detail/file_bytes.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
+#include "nephele/levelset/io/file_bytes.h"
 
 namespace nephele::detail {
 

@@ -8,7 +8,6 @@
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStandardAttributes.h>
-#include <OpenEXR/ImfTestFile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/deep_image.h"
+#include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/image_file.h"
@@ -101,8 +101,7 @@ void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep
 
 DeepImage readDeepExr(const std::string& path, double mostBytes) {
   try {
-    bool tiled = false, deep = false;
-    require(Imf::isOpenExrFile(path.c_str(), tiled, deep), path + ": is not a whole OpenEXR file");
+    const detail::ExrCheck check = detail::checkExr(path);
     Imf::MultiPartInputFile file(path.c_str());
     const Imf::Header& header = file.header(0);
     require(header.hasType() && Imf::isDeepData(header.type()),
@@ -126,6 +125,9 @@ DeepImage readDeepExr(const std::string& path, double mostBytes) {
     Imf::DeepScanLineInputPart part(file, 0);
     const auto width = std::size_t(image.width);
     double bytes = double(width) * image.height * sizeof(std::vector<DeepSample>);
+    // Every sample has Z and A.
+    constexpr std::int64_t kLeastSample = 4;
+    std::int64_t samplesLeft = check.sampleBytes / kLeastSample;
     const char* names[] = {"Z", "ZBack", "A", "R", "G", "B"};
     std::vector<unsigned> counts(width);
     std::vector<char*> pointers[6];
@@ -142,7 +144,11 @@ DeepImage readDeepExr(const std::string& path, double mostBytes) {
       part.setFrameBuffer(frame);
       part.readPixelSampleCounts(y, y);
       std::vector<std::vector<DeepSample>> row(width);
-      for (std::size_t x = 0; x != width; ++x) bytes += double(counts[x]) * sizeof(DeepSample);
+      for (std::size_t x = 0; x != width; ++x) {
+        bytes += double(counts[x]) * sizeof(DeepSample);
+        samplesLeft -= std::int64_t(counts[x]);
+        require(samplesLeft >= 0, path + ": is damaged: pixels have more samples than it holds");
+      }
       if (bytes > mostBytes)
         throw Error(fmt::format("{}: its samples need more than {:.1f} GB, which is the limit", path,
                                 mostBytes / 1e9));
@@ -168,10 +174,8 @@ DeepImage readDeepExr(const std::string& path, double mostBytes) {
       }
     }
     return image;
-  } catch (const Error&) {
-    throw;
   } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+    detail::refuseExr(path, error);
   }
 }
 

@@ -15,7 +15,6 @@
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfTestFile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,6 +23,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
 #include "nephele/render/image/image_file.h"
 
@@ -129,15 +129,23 @@ Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::
   return header;
 }
 
+void detail::refuseExr(const std::string& path, const std::exception& error) {
+  if (dynamic_cast<const Error*>(&error)) throw;
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    throw Error(path + ": its pixels need more memory than there is");
+  throw Error(path + ": is damaged: its pixels cannot be decoded");
+}
+
 std::optional<ImageCamera> readImageCamera(const std::string& path) {
   try {
+    detail::checkExr(path);
     const Imf::MultiPartInputFile file(path.c_str());
     const Imf::Header& header = file.header(0);
     if (!Imf::hasWorldToCamera(header) || !Imf::hasWorldToNDC(header)) return std::nullopt;
     return ImageCamera{numbers(Imf::worldToCamera(header)), numbers(Imf::worldToNDC(header)),
                        header.screenWindowWidth()};
   } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+    detail::refuseExr(path, error);
   }
 }
 
@@ -182,9 +190,7 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
 
 void detail::readExrFile(const std::string& path, const ImageReader& reader) {
   try {
-    bool tiled = false, deep = false;
-    require(Imf::isOpenExrFile(path.c_str(), tiled, deep), path + ": is not a whole OpenEXR file");
-    require(!deep, path + ": is a deep image, where a flat one is needed");
+    require(!checkExr(path).isDeep, path + ": is a deep image, where a flat one is needed");
     Imf::InputFile file(path.c_str());
     const ImageHeader header = headerOf(path, file.header());
     reader.begin(header);
@@ -207,10 +213,8 @@ void detail::readExrFile(const std::string& path, const ImageReader& reader) {
       file.readPixels(window.min.y + y, window.min.y + end - 1);
       for (int row = y; row != end; ++row) reader.row(row, values.data() + std::size_t(row - y) * rowSize);
     }
-  } catch (const Error&) {
-    throw;
   } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+    refuseExr(path, error);
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -31,9 +32,10 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
 std::optional<ImageCamera> readImageCamera(const std::string& path);
 
 /// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1. The pixels
-/// are those of the data window, the display is set where it is another.
+/// are those of the data window, the display is set where it is another. Nothing is allocated that the file
+/// cannot hold, nor more than `mostBytes`.
 /// @throws Error naming the path and what is wrong, also where only pixels are damaged.
-Image readImage(const std::string& path);
+Image readImage(const std::string& path, double mostBytes = std::numeric_limits<double>::infinity());
 
 /// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes.
 /// Reads every pixel. @throws Error as readImage does.

@@ -44,9 +44,16 @@ void readFile(const std::string& path, const ImageReader& reader) {
 }  // namespace
 }  // namespace detail
 
-Image readImage(const std::string& path) {
+Image readImage(const std::string& path, double mostBytes) {
   Image image;
   detail::readFile(path, {[&](const detail::ImageHeader& header) {
+                            const double bytes = double(header.width) * header.height *
+                                                 double(header.channels.size() * sizeof(float));
+                            if (bytes > mostBytes)
+                              throw Error(
+                                  fmt::format("{}: its pixels need {:.1f} GB of memory, and {:.1f} GB "
+                                              "is the limit",
+                                              path, bytes / 1e9, mostBytes / 1e9));
                             image.width = header.width;
                             image.height = header.height;
                             if (header.display != Image::Display{0, 0, header.width, header.height})

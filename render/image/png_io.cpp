@@ -4,10 +4,14 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <memory>
+#include <string_view>
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
@@ -24,7 +28,7 @@ using File = std::unique_ptr<std::FILE, CloseFile>;
 
 // libpng reports errors through a callback that must not return; it is C++ all the way up here, so it throws.
 [[noreturn]] void fail(png_structp, png_const_charp message) {
-  throw Error(message);
+  throw Error(fmt::format("is damaged: {}", message));
 }
 void ignore(png_structp, png_const_charp) {}
 
@@ -37,6 +41,22 @@ struct Handle {
   png_structp png;
   png_infop info;
 };
+
+/// Chunks are as long as they say, which libpng believes before it reads them. Up to the pixels: those come
+/// row by row.
+void requireWholeHeader(const std::string& path) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto size = std::int64_t(file.tellg());
+  for (std::int64_t at = 8; at + 12 <= size;) {
+    std::array<unsigned char, 8> head{};
+    file.seekg(at);
+    file.read(reinterpret_cast<char*>(head.data()), head.size());
+    const std::int64_t length = std::int64_t(head[0]) << 24 | head[1] << 16 | head[2] << 8 | head[3];
+    require(file.good() && length <= size - at - 12, "is damaged: a chunk is longer than the file");
+    if (std::string_view(reinterpret_cast<char*>(head.data()) + 4, 4) == "IDAT") return;
+    at += length + 12;
+  }
+}
 
 struct Writer : Handle {
   Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {}
@@ -86,8 +106,13 @@ void writePng(const std::string& path, const Image& image, const ViewTransform& 
 void detail::readPngFile(const std::string& path, const ImageReader& reader) {
   try {
     const File file(std::fopen(path.c_str(), "rb"));
-    require(file != nullptr, "the file cannot be opened");
+    require(file != nullptr, "cannot be opened");
+    requireWholeHeader(path);
+    const auto fileSize = double(std::filesystem::file_size(path));
     const Reader png;
+    // Texts and profiles may be packed a thousandfold.
+    png_set_chunk_malloc_max(png.png, 1 << 22);
+    png_set_chunk_cache_max(png.png, 256);
     png_init_io(png.png, file.get());
     png_read_info(png.png, png.info);
     const int depth = png_get_bit_depth(png.png, png.info);
@@ -100,6 +125,11 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
     png_read_update_info(png.png, png.info);
     const std::size_t count = png_get_channels(png.png, png.info);
     requireSize(path, header.width, header.height, (long long)(count));
+    // Of what is packed, a byte makes no more than 1032: the limit of deflate.
+    const double packed = double(png_get_rowbytes(png.png, png.info)) * header.height /
+                          (depth < 8 ? 8.0 / depth : 1.0) / double(count);
+    require(packed <= 1032 * fileSize, fmt::format("is damaged: {} bytes cannot hold {} x {} pixels",
+                                                   fileSize, header.width, header.height));
     const char* names[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
     for (std::size_t c = 0; c != count; ++c)
       header.channels.push_back({names[count - 1][c], depth == 16 ? "uint16" : "uint8"});
@@ -127,8 +157,11 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
       reader.row(y, values.data());
     }
     png_read_end(png.png, nullptr);
-  } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be read: {}", path, error.what()));
+  } catch (const std::bad_alloc&) {
+    throw Error(path + ": its pixels need more memory than there is");
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    throw Error(what.starts_with(path) ? what : fmt::format("{}: {}", path, what));
   }
 }
 

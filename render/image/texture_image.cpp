@@ -26,8 +26,8 @@ double fraction(double x) {
 
 }  // namespace
 
-Image readTexture(const std::string& path) {
-  Image image = readImage(path);
+Image readTexture(const std::string& path, double mostBytes) {
+  Image image = readImage(path, mostBytes);
   if (const Image::Channel* grey = image.find("Y"); grey && !image.find("R")) {
     const std::vector<float> values = grey->values;
     for (const char* name : {"R", "G", "B"}) image.add(name).values = values;

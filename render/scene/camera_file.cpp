@@ -18,6 +18,7 @@
 #include <string_view>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -95,7 +96,7 @@ class Fields {
   std::optional<double> number(const char* field) const {
     if (!has(field)) return std::nullopt;
     const Json& value = object_[field];
-    if (!value.is_number()) refuse(field, fmt::format("{} must be a number, not {}", field, value.dump()));
+    if (!value.is_number()) refuse(field, fmt::format("{} must be a number, not {}", field, shown(value)));
     return value.get<double>();
   }
 
@@ -248,9 +249,7 @@ CameraMotion parseCameraJson(const std::string& text, const std::string& name) {
     json = Json::parse(CountingIterator(text.data(), &line),
                        CountingIterator(text.data() + text.size(), &line), note);
   } catch (const Json::exception& error) {
-    const std::string message = error.what();
-    const std::size_t colon = message.find(": ");
-    fail(name, line, "is not JSON: " + (colon == std::string::npos ? message : message.substr(colon + 2)));
+    fail(name, line, "is not JSON: " + jsonFault(error.what()));
   }
   if (!json.is_object()) fail(name, 1, "must be an object with 'frames'");
   const Fields top(json, lines, 1, name);

@@ -81,8 +81,8 @@ Environment::Environment(int width, int height, std::vector<Vec3f> radiance, con
   rotation_ = std::remainder(double(options.rotationDegrees), 360.0);
 }
 
-Environment Environment::read(const std::string& path, const Options& options) {
-  const Image image = readImage(path);
+Environment Environment::read(const std::string& path, const Options& options, double mostBytes) {
+  const Image image = readImage(path, mostBytes);
   const bool grey = !image.find("R") && image.find("Y");
   const Image::Channel* channels[3];
   for (int c = 0; c != 3; ++c) {

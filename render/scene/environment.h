@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,8 +29,9 @@ class Environment {
   Environment(int width, int height, std::vector<Vec3f> radiance)
       : Environment(width, height, std::move(radiance), Options{}) {}
   /// From an OpenEXR, Radiance or PNG file with the channels R, G, B, or Y.
-  /// @throws Error naming the path and what is wrong.
-  static Environment read(const std::string& path, const Options& options);
+  /// @throws Error naming the path and what is wrong, also where its pixels need more than `mostBytes`.
+  static Environment read(const std::string& path, const Options& options,
+                          double mostBytes = std::numeric_limits<double>::infinity());
   static Environment read(const std::string& path) { return read(path, Options{}); }
 
   /// Turned by `degrees` about y, azimuths growing.

@@ -171,6 +171,19 @@ TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {
   EXPECT_NE(result.errors.find("too large"), std::string::npos) << result.errors;
 }
 
+TEST(Program, NamesInAnyEncodingAreWrittenAndStatisticsStayJson) {
+  const TemporaryFolder folder;
+  const std::string name = "caf\xe9 %s\n.vdb";
+  const ProgramResult result = runProgram("levelset " + kMesh + " --resolution 16 -o '" + folder.file(name) +
+                                          "' --stats " + folder.file("stats.json"));
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_TRUE(std::filesystem::exists(folder.file(name)));
+  EXPECT_NE(result.output.find("%s\\n.vdb"), std::string::npos) << "one line: " << result.output;
+  const nlohmann::json stats = nlohmann::json::parse(textOf(folder.file("stats.json")));
+  // U+FFFD stands where a byte is no letter.
+  EXPECT_NE(stats["command"].get<std::string>().find("caf\xef\xbf\xbd %s"), std::string::npos);
+}
+
 TEST(Program, OutputsThatMeetAreRefusedBeforeTheWork) {
   const TemporaryFolder folder;
   const std::string mesh = folder.file("ball.obj"), volume = folder.file("a.vdb");

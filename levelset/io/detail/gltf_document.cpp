@@ -159,6 +159,19 @@ void GltfDocument::checkExtensions() const {
   }
 }
 
+std::string GltfDocument::pathOf(const std::string& uri) const {
+  namespace fs = std::filesystem;
+  // A file from anywhere must not choose what is read of this machine.
+  const fs::path name = fs::path(decodePercent(uri)).lexically_normal();
+  if (name.empty() || name.is_absolute() || *name.begin() == "..")
+    file_.fail(fmt::format("a buffer is at {}, outside of the folder of the file", excerpt(uri)));
+  const fs::path path = fs::path(file_.path).parent_path() / name;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error))
+    file_.fail(fmt::format("a buffer is at {}, where there is no file", excerpt(uri)));
+  return path.string();
+}
+
 void GltfDocument::loadBuffers() {
   for (const json& buffer : list(root_, "buffers")) {
     const std::size_t length = size(buffer, "byteLength");
@@ -172,8 +185,7 @@ void GltfDocument::loadBuffers() {
         if (comma == std::string::npos) file_.fail("a buffer is a data URI but not base64");
         bytes = decodeBase64(std::string_view(uri).substr(comma + 8));
       } else {
-        bytes =
-            readWholeFile((std::filesystem::path(file_.path).parent_path() / decodePercent(uri)).string());
+        bytes = readWholeFile(pathOf(uri));
       }
     }
     if (bytes.size() < length)
@@ -182,6 +194,9 @@ void GltfDocument::loadBuffers() {
     bytes.resize(length);
     buffers_.push_back(std::move(bytes));
   }
+  constexpr std::size_t kAnyScene = std::size_t(1) << 22, kRepeats = 16;
+  elementsLeft_ = kAnyScene;
+  for (const std::string& bytes : buffers_) elementsLeft_ += kRepeats * bytes.size();
 }
 
 const nlohmann::json& GltfDocument::member(const json& object, const char* key) const {
@@ -239,7 +254,7 @@ const char* GltfDocument::window(std::size_t viewIndex, std::size_t offset, std:
   return buffer.data() + viewOffset + offset;
 }
 
-GltfValues GltfDocument::readAccessor(std::size_t index) const {
+GltfValues GltfDocument::readAccessor(std::size_t index) {
   const json& accessor = item("accessors", index);
   static constexpr std::pair<std::string_view, std::size_t> kTypes[] = {
       {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}};
@@ -253,6 +268,9 @@ GltfValues GltfDocument::readAccessor(std::size_t index) const {
   const bool normalized = accessor.value("normalized", false);
   const std::size_t elementSize = values.components * componentSize(type);
   values.count = size(accessor, "count");
+  if (values.count > elementsLeft_)
+    file_.fail("repeats its data so often that the mesh would be out of proportion to the file");
+  elementsLeft_ -= values.count;
 
   if (accessor.contains("bufferView")) {
     std::size_t stride = 0;
@@ -265,7 +283,7 @@ GltfValues GltfDocument::readAccessor(std::size_t index) const {
             number(first + i * stride + k * componentSize(type), type, normalized);
   } else {
     // Zeros without bytes behind them: the only count that the file's size does not bound.
-    if (values.count > (1u << 24))
+    if (values.count > (1u << 20))
       file_.fail(fmt::format("accessor {} declares {} elements without data", index, values.count));
     values.numbers.assign(values.count * values.components, 0.0);
   }

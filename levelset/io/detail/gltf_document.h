@@ -39,13 +39,16 @@ class GltfDocument {
   std::size_t size(const json& object, const char* key, std::size_t fallback) const;
   /// Entry `index` of a list of the root.
   const json& item(const char* listName, std::size_t index) const;
-  /// The elements of accessor `index`: sparse ones filled in, normalised ones in -1..1.
-  GltfValues readAccessor(std::size_t index) const;
+  /// The elements of accessor `index`: sparse ones filled in, normalised ones in -1..1. Refused once all that
+  /// were read are more than a scene of that size can need: instances are written out.
+  GltfValues readAccessor(std::size_t index);
 
  private:
   void parse();
   void checkExtensions() const;
   void loadBuffers();
+  /// Of a buffer in a file of its own.
+  std::string pathOf(const std::string& uri) const;
   const char* window(std::size_t viewIndex, std::size_t offset, std::size_t count, std::size_t elementSize,
                      std::size_t& stride) const;
 
@@ -53,6 +56,7 @@ class GltfDocument {
   json root_;
   std::string_view binary_;
   std::vector<std::string> buffers_;
+  std::size_t elementsLeft_ = 0;
 };
 
 }  // namespace nephele::detail

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "nephele/levelset/io/detail/file_bytes.h"
+#include "nephele/levelset/io/file_bytes.h"
 
 namespace nephele::detail {
 

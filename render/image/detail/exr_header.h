@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 #include <OpenEXR/ImfHeader.h>
 
+#include <exception>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,5 +19,8 @@ Imath::Box2i dataWindow(int width, int height, const std::optional<Image::Displa
 /// The header that all of our OpenEXR files have in common: windows, camera, colours, metadata.
 Imf::Header exrHeader(int width, int height, const std::optional<Image::Display>& display,
                       const ImageCamera& camera, const std::map<std::string, std::string>& metadata);
+
+/// Within a handler: passes our errors on, and says in our words what OpenEXR's are about.
+[[noreturn]] void refuseExr(const std::string& path, const std::exception& error);
 
 }  // namespace nephele::detail

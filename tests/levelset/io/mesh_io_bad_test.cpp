@@ -155,6 +155,40 @@ TEST(MeshIoBad, NodesThatFormACycleAreRefused) {
             std::string::npos);
 }
 
+// A file from anywhere must not choose what is read of this machine.
+TEST(MeshIoBad, BuffersOfGltfLieBesideIt) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.file("scene"));
+  std::ofstream(folder.file("outside.bin")) << "0123456789";
+  const std::string path = folder.file("scene/a.gltf");
+  for (const std::string uri : {"/dev/zero", "../outside.bin", "x/../../outside.bin", "%2e%2e/outside.bin",
+                                "%2fetc%2fpasswd", "file:///etc/passwd", "."}) {
+    std::ofstream(path) << R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":4,"uri":")" << uri
+                        << "\"}]}";
+    EXPECT_NE(messageFor(path).find("a buffer is at '" + uri + "'"), std::string::npos) << messageFor(path);
+  }
+}
+
+// 300 bytes for each million of vertices, all of them zero.
+TEST(MeshIoBad, GltfThatRepeatsItsDataWithoutEndIsRefused) {
+  const TemporaryFolder folder;
+  std::string primitives;
+  for (int i = 0; i != 300; ++i)
+    primitives += std::string(i > 0 ? "," : "") + R"({"attributes":{"POSITION":0},"mode":5})";
+  std::ofstream(folder.file("a.gltf"))
+      << R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[)"
+      << "{\"primitives\":[" << primitives << R"(]}],"accessors":[{"componentType":5126,"count":1000000,)"
+      << R"("type":"VEC3"}]})";
+  EXPECT_NE(messageFor(folder.file("a.gltf")).find("out of proportion"), std::string::npos)
+      << messageFor(folder.file("a.gltf"));
+}
+
+TEST(MeshIoBad, DevicesAreRefused) {
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/zero", folder.file("a.obj"));
+  EXPECT_NE(messageFor(folder.file("a.obj")).find("is a device"), std::string::npos);
+}
+
 TEST(MeshIoBad, UnknownOutputFormatIsRefused) {
   Mesh mesh;
   EXPECT_THROW(writeMesh("/tmp/a.xyz", mesh), Error);

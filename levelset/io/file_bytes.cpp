@@ -1,4 +1,4 @@
-#include "nephele/levelset/io/detail/file_bytes.h"
+#include "nephele/levelset/io/file_bytes.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "nephele/modeling/base/error.h"
 
-namespace nephele::detail {
+namespace nephele {
 
 FileBytes::FileBytes(const std::string& path)
     : file_(path, std::ios::binary | std::ios::ate), window_(std::size_t(kWindow)) {
@@ -91,4 +91,4 @@ void FileBytes::readAt(std::int64_t position, char* target, std::int64_t count) 
     if (place >= position && place < position + count) target[place - position] = value;
 }
 
-}  // namespace nephele::detail
+}  // namespace nephele

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace nephele::detail {
+namespace nephele {
 
 /// The bytes of a file as a stream that throws rather than end. Only a window of the file is in memory.
 class FileBytes final : public std::streambuf {
@@ -60,4 +60,4 @@ class FileBytes final : public std::streambuf {
   std::vector<std::pair<std::int64_t, char>> replaced_;
 };
 
-}  // namespace nephele::detail
+}  // namespace nephele

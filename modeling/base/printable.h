@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace nephele {
+
+/// `text` as a terminal may have it: control characters as \n, \t or \x1b, and no more than `most`
+/// characters, the last of which are dots then. Letters of any encoding stay.
+std::string printable(std::string_view text, std::size_t most = std::string_view::npos);
+
+/// What a message of nlohmann's JSON library says, without the library's own words.
+std::string jsonFault(std::string_view message);
+
+}  // namespace nephele
