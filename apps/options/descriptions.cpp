@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <filesystem>
+#include <limits>
 
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -47,8 +48,13 @@ Description meshDescription(const std::string& path, bool alwaysCountPairs) {
   }
   for (const MeshGroup& g : mesh.groups) d["groups"].push_back({{"name", g.name}, {"faces", g.faceCount}});
   d["merged_vertices"] = is.mergedVertices;
-  if (alwaysCountPairs || is.triangles <= kMostTriangles)
-    if (const auto count = countSelfIntersections(mesh)) d["self_intersections"] = *count;
+  constexpr double kAll = std::numeric_limits<double>::infinity(), kPairsInAMoment = 100;
+  if (alwaysCountPairs || is.triangles <= kMostTriangles) {
+    if (const auto count = countSelfIntersections(mesh, alwaysCountPairs ? kAll : kPairsInAMoment))
+      d["self_intersections"] = *count;
+    else if (!alwaysCountPairs)
+      d["self_intersections"] = "not counted: too many triangles are near each other";
+  }
   d["problems"] = is.problems();
   return d;
 }

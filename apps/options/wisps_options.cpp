@@ -176,7 +176,7 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
             "How near a dot's random place stays to the last one's: towards 1, dots crowd along walks.");
   addCount(app, "--walk-length", a.walkLength, 1, 100000000, "Dots after which a new walk starts.");
   addNumber(app, "--thickness", a.thickness, 0, 1, "0: dots lie on a crumpled sheet; 1: they fill the wisp.");
-  addNumber(app, "--clump", a.clump, 0, 100, "0: dots on a sphere; small: near it; large: about its centre.");
+  addNumber(app, "--clump", a.clump, 0, 10, "0: dots on a sphere; small: near it; large: about its centre.");
   addNumber(app, "--amplitude", a.amplitude, 0, 1000, "Strength of the noise that moves dots radially.");
   addNumber(app, "--frequency", a.frequency, 1e-6, 1e6, "Its cycles along the radius of a wisp.");
   addCount(app, "--octaves", a.octaves, 1, 16, "Noises added up, each finer and weaker.");

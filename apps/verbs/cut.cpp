@@ -45,7 +45,7 @@ void cut(const CutArguments& arguments, Run& run) {
   std::vector<CutPart> parts = arguments.readParts(run);
   // As long as the cut itself: on the side.
   auto crossings = std::async(std::launch::async, [mesh = arguments.isModel() ? parts[0].mesh : Mesh()] {
-    return mesh.faceCount() > 0 ? countSelfIntersections(mesh).value_or(0) : 0;
+    return mesh.faceCount() > 0 ? countSelfIntersections(mesh, 100).value_or(0) : 0;
   });
   const CutKnives knives = knivesOf(arguments, parts, run);
   requirePiecesMemory(knives.knives, parts.size(), run);

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "apps/app.h"
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -39,12 +41,25 @@ void bindOptions(CLI::App& app, LevelsetOptions& options) {
   addSubdivide(app, options.subdivide);
 }
 
+/// A wrap need not be finer than voxels are.
+MeshRepairOptions repairFor(const LevelsetOptions& options, double longestSide) {
+  MeshRepairOptions repair = options.repair;
+  const double voxel = options.voxelSizeOption->count() > 0
+                           ? options.voxelSize.worldUnits(longestSide) / longestSide
+                           : 1.0 / options.resolution;
+  const double coarser = std::clamp(voxel / repair.wrapAlpha, 1.0, 1 / repair.wrapAlpha);
+  repair.wrapAlpha *= coarser;
+  repair.wrapOffset *= coarser;
+  return repair;
+}
+
 void convert(const LevelsetOptions& options, Run& run) {
   run.begin("read");
   const Mesh soup = readMesh(options.input);
   run.begin("repair");
-  RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, options.repair, run); });
-  for (const std::string& repair : repaired.repairs) run.note(repair);
+  const MeshRepairOptions repair = repairFor(options, boundingBox(soup).longestSide());
+  RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, repair, run); });
+  for (const std::string& what : repaired.repairs) run.note(what);
   if (options.subdivide > 0) {
     repaired.mesh = namingFile(
         options.input, [&] { return subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run); });

@@ -15,6 +15,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <sstream>
 
 #include "nephele/levelset/grid/detail/block_table.h"
 #include "nephele/levelset/grid/openvdb_assembly.h"
@@ -107,15 +108,11 @@ BlockTable blocksOf(const openvdb::FloatGrid& grid, const std::string& name) {
   return result;
 }
 
-openvdb::Mat4d matrixOf(const openvdb::GridBase& grid) {
-  return grid.transform().baseMap()->getAffineMap()->getMat4();
-}
-
 /// Places in the world are floats: where these are coarse beside the voxels between `first` and `last`, the
 /// grid would lie elsewhere, and its voxels upon each other.
 void requireResolvedVoxels(const openvdb::GridBase& grid, const Vec3i& first, const Vec3i& last) {
   constexpr double kMostOfAVoxel = 0.125;
-  const openvdb::Mat4d m = matrixOf(grid);
+  const openvdb::Mat4d m = matrixOf(grid.transform());
   double farthest = 0;
   for (int axis = 0; axis < 3; ++axis) {
     double reach = std::abs(m(3, axis));
@@ -212,10 +209,45 @@ std::string displayName(const openvdb::GridBase& grid) {
   return displayName(grid.getName());
 }
 
+openvdb::Mat4d matrixOf(const openvdb::math::Transform& transform) {
+  const openvdb::math::MapBase& map = *transform.baseMap();
+  openvdb::Mat4d matrix = openvdb::Mat4d::identity();
+  for (int axis = 0; axis < 3; ++axis) {
+    openvdb::Vec3d unit(0.0);
+    unit[axis] = 1.0;
+    const openvdb::Vec3d side = map.applyJacobian(unit);
+    for (int c = 0; c < 3; ++c) matrix(axis, c) = side[c];
+  }
+  const openvdb::Vec3d origin = map.applyMap(openvdb::Vec3d(0.0));
+  for (int c = 0; c < 3; ++c) matrix(3, c) = origin[c];
+  return matrix;
+}
+
+openvdb::math::Transform::Ptr uniformTransform(double voxelSize, const openvdb::Vec3d& translation) {
+  using openvdb::math::Transform, openvdb::math::UniformScaleMap, openvdb::math::UniformScaleTranslateMap;
+  // Below it OpenVDB takes the volume of a voxel for zero.
+  constexpr double kLeast = 2e-5;
+  if (voxelSize >= kLeast) {
+    auto transform = Transform::createLinearTransform(voxelSize);
+    if (!translation.isZero()) transform->postTranslate(translation);
+    return transform;
+  }
+  // As it would be read from a file, which needs no constructor.
+  std::stringstream bytes;
+  const double inverse = 1 / voxelSize;
+  if (!translation.isZero()) translation.write(bytes);
+  for (const double value : {voxelSize, voxelSize, inverse, inverse * inverse, inverse / 2})
+    openvdb::Vec3d(value).write(bytes);
+  const openvdb::math::MapBase::Ptr map =
+      translation.isZero() ? UniformScaleMap::create() : UniformScaleTranslateMap::create();
+  map->read(bytes);
+  return std::make_shared<Transform>(map);
+}
+
 Lattice latticeOf(const openvdb::GridBase& grid) {
   require(grid.transform().isLinear(),
           fmt::format("grid {} has a frustum transform; resample it to a linear one", displayName(grid)));
-  const openvdb::Mat4d m = matrixOf(grid);
+  const openvdb::Mat4d m = matrixOf(grid.transform());
   Affine map;
   // OpenVDB multiplies row vectors from the left.
   for (int r = 0; r < 3; ++r) {
@@ -233,12 +265,8 @@ openvdb::math::Transform::Ptr transformOf(const Lattice& lattice, double voxelSi
   const Vec3f& translation = lattice.indexToWorld.translation;
   const openvdb::Vec3d t(translation.x, translation.y, translation.z);
   const float s = a(0, 0);
-  if (s > 0.0f && a == Mat3f::scaling(s)) {
-    auto transform =
-        openvdb::math::Transform::createLinearTransform(s == float(voxelSize) ? voxelSize : double(s));
-    if (!t.isZero()) transform->postTranslate(t);
-    return transform;
-  }
+  if (s > 0.0f && a == Mat3f::scaling(s))
+    return uniformTransform(s == float(voxelSize) ? voxelSize : double(s), t);
   openvdb::Mat4d matrix = openvdb::Mat4d::identity();
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) matrix(c, r) = a(r, c);

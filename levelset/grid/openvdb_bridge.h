@@ -20,6 +20,14 @@ void initializeOpenVdb();
 std::string displayName(const std::string& name);
 std::string displayName(const openvdb::GridBase& grid);
 
+/// A linear transform from voxels to the world, for row vectors. OpenVDB's own makes none of voxels below
+/// 1e-5.
+openvdb::Mat4d matrixOf(const openvdb::math::Transform& transform);
+
+/// Voxels of an edge that may be so small that OpenVDB's constructors refuse it.
+openvdb::math::Transform::Ptr uniformTransform(double voxelSize,
+                                               const openvdb::Vec3d& translation = {0, 0, 0});
+
 /// Where the voxels of a grid stand. @throws Error naming the grid if its transform is not linear or is
 /// singular.
 Lattice latticeOf(const openvdb::GridBase& grid);

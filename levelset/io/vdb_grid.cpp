@@ -215,9 +215,8 @@ VdbGridInfo describe(const VdbGrid& handle) {
   }
   const openvdb::Vec3d size = grid.voxelSize();
   info.voxelSize = {float(size.x()), float(size.y()), float(size.z())};
-  if (const auto linear =
-          grid.transform().isLinear() ? grid.transform().baseMap()->getAffineMap() : nullptr) {
-    const openvdb::Mat3d m = linear->getMat4().getMat3();
+  if (grid.transform().isLinear()) {
+    const openvdb::Mat3d m = detail::matrixOf(grid.transform()).getMat3();
     const openvdb::Mat3d difference = m - openvdb::Mat3d::identity() * m(0, 0);
     info.uniform = difference.absMax() <= 1e-9 * std::abs(m(0, 0));
   } else {

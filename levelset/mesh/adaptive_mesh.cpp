@@ -44,8 +44,12 @@ Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
   for (const openvdb::Vec3s& p : points) mesh.positions.push_back({p.x(), p.y(), p.z()});
   mesh.corners.reserve(4 * quads.size() + 3 * triangles.size());
   mesh.faceStart.reserve(quads.size() + triangles.size() + 1);
-  for (const openvdb::Vec4I& q : quads) mesh.addFace(std::array{q[3], q[2], q[1], q[0]});
-  for (const openvdb::Vec3I& t : triangles) mesh.addFace(std::array{t[2], t[1], t[0]});
+  // OpenVDB winds faces in voxels, whatever the transform does to them.
+  const bool isMirrored = determinant(grid.indexToWorld().linear) < 0;
+  for (const openvdb::Vec4I& q : quads)
+    mesh.addFace(isMirrored ? std::array{q[0], q[1], q[2], q[3]} : std::array{q[3], q[2], q[1], q[0]});
+  for (const openvdb::Vec3I& t : triangles)
+    mesh.addFace(isMirrored ? std::array{t[0], t[1], t[2]} : std::array{t[2], t[1], t[0]});
   return mesh;
 }
 

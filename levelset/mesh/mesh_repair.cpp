@@ -89,9 +89,11 @@ class Ladder {
                         ? result_.before
                         : diagnose(result_.mesh);
     require(result_.after.closed() && result_.after.volume > 0,
-            fmt::format("mesh repair: the mesh could not be closed ({}); repair mode 'wrap' makes a closed "
+            fmt::format("mesh repair: the mesh could not be closed{}; repair mode 'wrap' makes a closed "
                         "surface around it",
-                        joined(result_.after.problems())));
+                        result_.after.problems().empty()
+                            ? ", or holds nothing"
+                            : fmt::format(" ({})", joined(result_.after.problems()))));
     if (isThin(result_.after)) failThin(result_.after);
     return std::move(result_);
   }
@@ -204,7 +206,7 @@ class Ladder {
   }
 
   void fillHoles() {
-    detail::FilledMesh filled = detail::withHolesFilled(result_.mesh);
+    detail::FilledMesh filled = detail::withHolesFilled(result_.mesh, progress_);
     progress_.check();
     const detail::MeshParts parts = detail::findParts(filled.mesh);
     const SheetShare sheets = sheetShare(filled, parts);
@@ -266,13 +268,22 @@ class Ladder {
     progress_.begin("wrap");
     const double side = static_cast<double>(result_.before.box.longestSide());
     const double alpha = options_.wrapAlpha * side, offset = options_.wrapOffset * side;
-    result_.mesh = detail::withVertexAttributesOf(result_.mesh, detail::wrapped(result_.mesh, alpha, offset));
+    result_.mesh =
+        detail::withVertexAttributesOf(result_.mesh, detail::wrapped(result_.mesh, alpha, offset, progress_));
     // What was done before does not show in the wrap.
     result_.repairs.clear();
     report(
         fmt::format("wrapped with alpha {:.3g} ({:.2g} % of the longest side), offset {:.3g} ({:.2g} %): {}",
                     alpha, 100 * options_.wrapAlpha, offset, 100 * options_.wrapOffset, why));
     progress_.check();
+    // A shell on both sides of a sheet holds half of its own area times its thickness; a solid far more.
+    constexpr double kMostOfAShell = 1.5;
+    const double shell = surfaceArea(result_.mesh) / 2 * 2 * offset;
+    if (!result_.before.closed() && signedVolume(result_.mesh) < kMostOfAShell * shell)
+      report(
+          fmt::format("the surface is open, so that the wrap is a shell about {:.3g} thick around it, not a "
+                      "solid; close what is open for a solid",
+                      2 * offset));
   }
 
   const Mesh& source_;

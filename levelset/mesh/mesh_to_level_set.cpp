@@ -8,7 +8,8 @@
 // size, loses its sign without any other sign of trouble. The volume sums a share per voxel that rises
 // linearly with distance, over one voxel and over two; (4 narrow - wide) / 3 cancels the error that curvature
 // makes, and both are exact for planes along the axes. It needs a band of 1 voxel, and holds for displaced
-// surfaces too, whose slope scales both ramps alike.
+// surfaces too, whose slope scales both ramps alike. What marching cubes would enclose is compared with it,
+// too.
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 
 #include <fmt/format.h>
@@ -18,6 +19,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "nephele/levelset/mesh/isosurface_volume.h"
 #include "nephele/levelset/mesh/mesh_band.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/parallel.h"
@@ -35,15 +37,48 @@ double insideShare(double u) {
   return (4.0 * narrow - wide) / 3.0;
 }
 
+/// What is wrong with the volume, and what to do.
+[[noreturn]] void failThin(const Mesh& mesh, const VoxelGrid<float>& grid, const std::string& what,
+                           double better) {
+  std::string where;
+  if (const auto thin = detail::thinPlace(grid)) {
+    // Marching cubes keep walls of two voxels.
+    constexpr double kKnown = 0.1, kKept = 2.2;
+    if (thin->thickness > kKnown) better = std::min(better, grid.voxelSize() * thin->thickness / kKept);
+    where = fmt::format(", for example near ({:.4g}, {:.4g}, {:.4g}), where its wall is {}", thin->position.x,
+                        thin->position.y, thin->position.z,
+                        thin->thickness > kKnown ? fmt::format("about {:.1f} voxels thick", thin->thickness)
+                                                 : "thinner than a voxel");
+  }
+  throw Error(fmt::format(
+      "level set: {}: the shape is too thin for a voxel size of {:.4g}{}; try resolution {:.0f} (voxel size "
+      "{:.4g})",
+      what, grid.voxelSize(), where, std::ceil(boundingBox(mesh).longestSide() / better), better));
+}
+
+/// Walls of just under half a voxel have the right volume in the sum of shares, and next to none as a
+/// surface.
+void checkSurface(const Mesh& mesh, const VoxelGrid<float>& grid, double gridVolume) {
+  constexpr double kMostLost = 0.1;
+  const double surfaceVolume = detail::isosurfaceVolume(grid);
+  const double lost = 1 - surfaceVolume / gridVolume;
+  if (std::abs(lost) < kMostLost) return;
+  failThin(mesh, grid,
+           fmt::format("its surface encloses a volume of {:.4g}, the mesh one of {:.4g} ({:.0f} % lost)",
+                       surfaceVolume, gridVolume, 100 * lost),
+           grid.voxelSize() / 2);
+}
+
 void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, double voxelSize, const Progress& progress) {
   const double meshVolume = signedVolume(mesh);
   const double gridVolume = enclosedVolume(grid);
-  if (std::abs(gridVolume / meshVolume - 1.0) < kVolumeTolerance) return;
+  if (std::abs(gridVolume / meshVolume - 1.0) < kVolumeTolerance) return checkSurface(mesh, grid, gridVolume);
   // Triangles of parts that overlap count the overlap twice; the solid they bound counts it once.
   progress.begin("volume of the solid");
   const double solid = solidVolume(mesh);
   const double error = std::abs(gridVolume / solid - 1.0);
   if (error < kVolumeTolerance) {
+    checkSurface(mesh, grid, gridVolume);
     progress.note(fmt::format(
         "parts of the mesh overlap, so that the volume of its triangles ({:.6g}) is not that of the "
         "solid ({:.6g}); the level set encloses {:.6g}",
@@ -51,12 +86,10 @@ void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, double voxelSiz
     return;
   }
   // The error of a shape that is thin for its voxels falls with the square of their size.
-  const double longest = boundingBox(mesh).longestSide();
-  const double better = voxelSize * std::min(0.5, std::sqrt(0.5 * kVolumeTolerance / error));
-  throw Error(fmt::format(
-      "level set: it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart, 1 % allowed): the "
-      "shape is too thin for a voxel size of {:.4g}; try resolution {:.0f} (voxel size {:.4g})",
-      gridVolume, solid, 100 * error, voxelSize, std::ceil(longest / better), better));
+  failThin(mesh, grid,
+           fmt::format("it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart, 1 % allowed)",
+                       gridVolume, solid, 100 * error),
+           voxelSize * std::min(0.5, std::sqrt(0.5 * kVolumeTolerance / error)));
 }
 
 void checkMesh(const Mesh& mesh) {

@@ -121,18 +121,28 @@ class Pairs {
 
 }  // namespace
 
-std::optional<std::size_t> countSelfIntersections(const Mesh& mesh) {
+std::optional<std::size_t> countSelfIntersections(const Mesh& mesh, double mostPairsPerTriangle) {
   const Mesh triangles = triangulated(detail::withMergedPositions(requireValid(mesh)));
   const Pairs pairs(triangles);
   const FaceTree tree = pairs.tree();
   std::atomic<std::size_t> count{0};
+  constexpr double kAnyMesh = 1e6;
+  const double mostPairs = kAnyMesh + mostPairsPerTriangle * double(triangles.faceCount());
+  std::atomic<std::size_t> pairsMet{0};
   constexpr std::size_t kLeavesPerTask = 64;
   parallelFor(tree.leaves.size(), kLeavesPerTask, [&](std::size_t begin, std::size_t end) {
     std::size_t found = 0;
-    for (std::size_t leaf = begin; leaf < end; ++leaf)
-      tree.forPairs(leaf, [&](std::uint32_t f, std::uint32_t g) { found += pairs.intersect(f, g); });
+    for (std::size_t leaf = begin; leaf < end && double(pairsMet) <= mostPairs; ++leaf) {
+      std::size_t met = 0;
+      tree.forPairs(leaf, [&](std::uint32_t f, std::uint32_t g) {
+        ++met;
+        found += pairs.intersect(f, g);
+      });
+      pairsMet += met;
+    }
     count += found;
   });
+  if (double(pairsMet) > mostPairs) return std::nullopt;
   return count.load();
 }
 

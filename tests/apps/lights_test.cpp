@@ -107,7 +107,7 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
       {"--point 1e9,0,0,4", "use a sun", 1},
       {"--point 1,2,3,1e30", "point: expected three numbers", 1},
       {"--sky nowhere.exr", "nowhere.exr: cannot be read", 1},
-      {"--sky " + file("broken.hdr"), "broken.hdr: ends before its last pixel", 1},
+      {"--sky " + file("broken.hdr"), "broken.hdr: is damaged: 0 bytes cannot hold 4 x 2 pixels", 1},
       {"--read-deep-shadow " + file("map.exr"), "map.exr: is not a deep image", 1},
       {"--point 0.1,0,0,1 --shadows deep", "choose shadows from a volume", 1},
       {"--shadows deep --integrator path", "deep shadow maps can only be marched", 1},

@@ -167,12 +167,12 @@ TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {
 
 TEST_F(WispsVerb, BadOptionsAreUsageErrorsThatNameThem) {
   for (const std::string bad :
-       {"--guides 0",        "--dots 0",           "--dots -5",       "--size 0",          "--size -1%",
-        "--size nan",        "--size-variation 1", "--density -1",    "--correlation 1.1", "--walk-length 0",
-        "--thickness 2",     "--clump -1",         "--amplitude inf", "--frequency 0",     "--octaves 0",
-        "--displacement -1", "--resolution 0",     "--voxel-size 0",  "--dot-radius -1",   "--dot-radius 90%",
-        "--color 1,2",       "--color 2,0,0",      "--velocity 1,2",  "--velocity gale",   "--shutter 1,0",
-        "--shutter 0,1",     "--shape cube",       "--points p.obj",  "--seed -1"}) {
+       {"--guides 0",       "--dots 0",           "--dots -5",      "--size 0",          "--size -1%",
+        "--size nan",       "--size-variation 1", "--density -1",   "--correlation 1.1", "--walk-length 0",
+        "--thickness 2",    "--clump -1",         "--clump 100",    "--amplitude inf",   "--frequency 0",
+        "--octaves 0",      "--displacement -1",  "--resolution 0", "--voxel-size 0",    "--dot-radius -1",
+        "--dot-radius 90%", "--color 1,2",        "--color 2,0,0",  "--velocity 1,2",    "--velocity gale",
+        "--shutter 1,0",    "--shutter 0,1",      "--shape cube",   "--points p.obj",    "--seed -1"}) {
     const ProgramResult result = wisps("w.vdb", bad);
     EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;
     EXPECT_NE(result.errors.find(bad.substr(0, bad.find(' '))), std::string::npos) << result.errors;

@@ -8,12 +8,14 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <istream>
 #include <set>
 #include <span>
 #include <vector>
 
+#include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/levelset/io/detail/blosc_header.h"
 #include "nephele/modeling/base/error.h"
 
@@ -269,7 +271,10 @@ void checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree) {
   try {
     openvdb::math::Transform transform;
     transform.read(stream);
-    if (transform.isLinear()) transform.baseMap()->getAffineMap();
+    // Voxels of whose edges single precision cannot hold the cube.
+    constexpr double kLeast = 1e-12;
+    if (transform.isLinear() && !(std::cbrt(std::abs(matrixOf(transform).det())) >= kLeast))
+      throw Error("its transform has no inverse, or its voxels are too small");
   } catch (const openvdb::Exception&) {
     throw Error("its transform has no inverse, or its voxels are too small");
   }

@@ -4,7 +4,8 @@
 // points that no manifold can hold; borders that lie on each other are stitched again. Each remaining
 // boundary loop is then triangulated so that the sum of area and bending is least (Liepa, "Filling Holes in
 // Meshes", 2003), with a search restricted to the loop's Delaunay triangulation and, where that has no
-// answer, over all triangulations. A loop too long for the second search stays open.
+// answer, over all triangulations. Loops too long for the second search are first tried as flat ones, and may
+// stay open.
 #include "nephele/levelset/mesh/detail/mesh_holes.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -16,6 +17,7 @@
 #include <CGAL/Surface_mesh.h>
 
 #include <array>
+#include <functional>
 #include <iterator>
 #include <vector>
 
@@ -36,12 +38,27 @@ std::vector<Surface::Halfedge_index> boundaryLoop(const Surface& surface, Surfac
   return loop;
 }
 
-bool fill(Surface& surface, Surface::Halfedge_index border, std::size_t length) {
+/// Ends a search that is cancelled.
+struct HoleVisitor : pmp::Hole_filling::Default_visitor {
+  explicit HoleVisitor(const Progress& told) : progress(told) {}
+
+  void quadratic_step() const { progress.check(); }
+  void cubic_step() const { progress.check(); }
+
+  const Progress& progress;
+};
+
+bool fill(Surface& surface, Surface::Halfedge_index border, std::size_t length, const Progress& progress) {
+  HoleVisitor visitor(progress);
+  const bool isLong = length > kLongestSearchedLoop;
   for (const bool delaunay : {true, false}) {
-    if (!delaunay && length > kLongestSearchedLoop) return false;
+    if (!delaunay && isLong) return false;
     std::vector<Surface::Face_index> patch;
     pmp::triangulate_hole(surface, border, std::back_inserter(patch),
-                          CGAL::parameters::use_delaunay_triangulation(delaunay));
+                          CGAL::parameters::use_delaunay_triangulation(delaunay)
+                              .use_2d_constrained_delaunay_triangulation(isLong)
+                              .do_not_use_cubic_algorithm(isLong)
+                              .visitor(std::ref(visitor)));
     if (!patch.empty()) return true;
   }
   return false;
@@ -49,7 +66,7 @@ bool fill(Surface& surface, Surface::Halfedge_index border, std::size_t length) 
 
 }  // namespace
 
-FilledMesh withHolesFilled(const Mesh& triangles) {
+FilledMesh withHolesFilled(const Mesh& triangles, const Progress& progress) {
   std::vector<Point> points;
   for (const Vec3d& p : triangles.positions) points.emplace_back(p.x, p.y, p.z);
   std::vector<std::array<std::size_t, 3>> faces;
@@ -69,7 +86,8 @@ FilledMesh withHolesFilled(const Mesh& triangles) {
   std::vector<Surface::Face_index> openFaces;
   for (const auto border : loops) {
     const std::size_t length = boundaryLoop(surface, border).size();
-    if (fill(surface, border, length)) {
+    progress.check();
+    if (fill(surface, border, length, progress)) {
       ++result.holes;
       result.edges += length;
     } else {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
 
 namespace nephele::detail {
 
@@ -19,7 +20,8 @@ struct FilledMesh {
   std::vector<std::uint32_t> openFaces;  ///< A face at each hole that could not be filled.
 };
 
-/// Orients patches, splits what is not manifold, stitches equal borders, and triangulates every hole.
-FilledMesh withHolesFilled(const Mesh& triangles);
+/// Orients patches, splits what is not manifold, stitches equal borders, and triangulates every hole. @throws
+/// Cancelled.
+FilledMesh withHolesFilled(const Mesh& triangles, const Progress& progress);
 
 }  // namespace nephele::detail

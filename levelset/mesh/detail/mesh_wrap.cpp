@@ -11,14 +11,37 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::detail {
+namespace {
 
-Mesh wrapped(const Mesh& triangles, double alpha, double offset) {
+/// Tells progress while the triangulation is carved, and ends it where it is cancelled.
+struct WrapVisitor : CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
+  WrapVisitor(const Progress& told, double points) : progress(told), expected(points) {}
+
+  template <class Wrapper, class Gate>
+  void before_facet_treatment(const Wrapper&, const Gate&) {
+    if (++facets % 256 == 0) progress.check();
+  }
+  template <class Wrapper, class Point>
+  void before_Steiner_point_insertion(const Wrapper&, const Point&) {
+    if (++inserted % 256 == 0) progress.advance(std::min(0.99, double(inserted) / expected));
+  }
+
+  const Progress& progress;
+  double expected;
+  std::size_t facets = 0, inserted = 0;
+};
+
+}  // namespace
+
+Mesh wrapped(const Mesh& triangles, double alpha, double offset, const Progress& progress) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Point = Kernel::Point_3;
   std::vector<Point> points;
@@ -32,9 +55,15 @@ Mesh wrapped(const Mesh& triangles, double alpha, double offset) {
   }
   require(!faces.empty(), "mesh repair: every triangle is degenerate, there is nothing to wrap");
 
+  // Measured on closed surfaces, which have one side; sheets have two.
+  constexpr double kPointsPerSquare = 1;
+  WrapVisitor visitor(progress, kPointsPerSquare * surfaceArea(triangles) / (alpha * alpha) + 1);
   CGAL::Surface_mesh<Point> wrap;
   try {
-    CGAL::alpha_wrap_3(points, faces, alpha, offset, wrap);
+    CGAL::alpha_wrap_3(points, faces, alpha, offset, wrap, CGAL::parameters::default_values(),
+                       CGAL::parameters::visitor(std::ref(visitor)));
+  } catch (const Cancelled&) {
+    throw;
   } catch (const std::exception& error) {
     throw Error(std::string("mesh repair: alpha wrapping failed: ") + error.what());
   }

@@ -8,17 +8,17 @@ namespace nephele {
 
 namespace detail {
 
-FilledMesh withHolesFilled(const Mesh&) {
+FilledMesh withHolesFilled(const Mesh&, const Progress&) {
   throw Error("the mesh is open, and its holes cannot be filled: this nephele was built without CGAL");
 }
 
-Mesh wrapped(const Mesh&, double, double) {
+Mesh wrapped(const Mesh&, double, double, const Progress&) {
   throw Error("meshes cannot be wrapped: this nephele was built without CGAL");
 }
 
 }  // namespace detail
 
-std::optional<std::size_t> countSelfIntersections(const Mesh&) {
+std::optional<std::size_t> countSelfIntersections(const Mesh&, double) {
   return std::nullopt;
 }
 

@@ -217,5 +217,30 @@ TEST(AdaptiveMesh, RefusesBadArguments) {
   EXPECT_THROW(adaptiveMesh(*fog, std::nan(""), 0), Error);
 }
 
+// A mirrored lattice turns faces inside out unless they are wound the other way.
+TEST(AdaptiveMesh, IsOutwardInMirroredLattices) {
+  const double radius = 8;
+  Affine mirrored{Mat3f::scaling(0.5f), {}};
+  mirrored.linear(0, 0) = -0.5f;
+  const auto ball = [&](const Affine& toWorld) {
+    VoxelGrid<float> grid("ball", Lattice{toWorld, inverse(toWorld), 0.5f}, -1.5f);
+    for (int bz = -2; bz != 2; ++bz)
+      for (int by = -2; by != 2; ++by)
+        for (int bx = -2; bx != 2; ++bx) {
+          float* samples = grid.add({bx, by, bz});
+          for (int z = 0; z != 8; ++z)
+            for (int y = 0; y != 8; ++y)
+              for (int x = 0; x != 8; ++x)
+                *samples++ = float(
+                    std::clamp(0.5 * (radius - std::hypot(8 * bx + x, 8 * by + y, 8 * bz + z)), -1.5, 1.5));
+        }
+    return toBricks(grid);
+  };
+  for (const double adaptivity : {0.0, 0.3})
+    EXPECT_NEAR(signedVolume(adaptiveMesh(*ball(mirrored), 0, adaptivity)),
+                signedVolume(adaptiveMesh(*ball({Mat3f::scaling(0.5f), {}}), 0, adaptivity)), 1e-3);
+  EXPECT_GT(signedVolume(adaptiveMesh(*ball(mirrored), 0, 0)), 0);
+}
+
 }  // namespace
 }  // namespace nephele

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "nephele/levelset/io/mesh_io.h"
@@ -239,6 +240,62 @@ TEST(MeshRepair, SheetsAreRefusedAndWrappedOnDemand) {
   EXPECT_NE(shell.repairs[0].find("wrapped with alpha 0.1 (10 % of the longest side), offset 0.02 (2 %)"),
             std::string::npos)
       << shell.repairs[0];
+}
+
+TEST(MeshRepair, SaysThatAWrapOfAnOpenSurfaceIsAShell) {
+  Mesh open = test::icosphere(1, 3);
+  open.corners.resize(open.corners.size() - 3 * 400);
+  open.faceStart.resize(open.faceStart.size() - 400);
+  const MeshRepairOptions options{.mode = Mode::wrap, .wrapAlpha = 0.05, .wrapOffset = 0.01};
+  const RepairedMesh shell = repairMesh(open, options);
+  ASSERT_EQ(shell.repairs.size(), 2u);
+  // The longest side is 2, and the offset lies on both sides.
+  EXPECT_NE(shell.repairs[1].find("a shell about 0.04 thick"), std::string::npos) << shell.repairs[1];
+  EXPECT_EQ(repairMesh(test::icosphere(1, 3), options).repairs.size(), 1u)
+      << "a closed surface becomes a solid";
+}
+
+TEST(MeshRepair, AWrapStopsWhereItIsCancelled) {
+  struct Stop final : Progress {
+    mutable std::atomic<int> asked{0};
+    bool cancelled() const override { return ++asked > 20; }
+  };
+  EXPECT_THROW(repairMesh(cube(), {.mode = Mode::wrap}, Stop()), Cancelled);
+}
+
+// Searching all triangulations of such a loop takes hours.
+TEST(MeshRepair, LongFlatLoopsAreFilledWithoutSearch) {
+  constexpr std::uint32_t kCount = 5000;
+  Mesh cup;
+  std::vector<std::uint32_t> bottom;
+  for (const double z : {0.0, 1.0})
+    for (std::uint32_t i = 0; i < kCount; ++i) {
+      const double angle = 2 * M_PI * i / kCount;
+      cup.positions.push_back({std::cos(angle), std::sin(angle), z});
+    }
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const std::uint32_t next = (i + 1) % kCount;
+    cup.addFace(std::array{i, next, kCount + next, kCount + i});
+    bottom.push_back(kCount - 1 - i);
+  }
+  cup.addFace(bottom);
+  const RepairedMesh filled = repairMesh(cup);
+  EXPECT_TRUE(filled.after.closed());
+  // A prism: the area of the polygon times its height.
+  EXPECT_NEAR(filled.after.volume, 0.5 * kCount * std::sin(2 * M_PI / kCount), 1e-9);
+}
+
+TEST(MeshRepair, PairsOfTrianglesAreCountedWithinALimit) {
+  // A fan whose triangles all meet at its hub: two thousand squared over two pairs of boxes at most.
+  Mesh fan;
+  fan.positions.push_back({0, 0, 0});
+  for (std::uint32_t i = 0; i <= 4000; ++i) {
+    fan.positions.push_back({std::cos(i * 1e-3), std::sin(i * 1e-3), (i % 2) * 1e-3});
+    if (i > 0) fan.addFace(std::array{0u, i, i + 1});
+  }
+  EXPECT_FALSE(countSelfIntersections(fan, 10).has_value());
+  EXPECT_TRUE(countSelfIntersections(fan).has_value());
+  EXPECT_EQ(countSelfIntersections(test::icosphere(1, 3), 20), std::size_t(0));
 }
 
 TEST(MeshRepair, FlatClosedMeshIsRefused) {

@@ -4,11 +4,15 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <random>
 
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/isosurface_volume.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_band.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/triangle_kernels.h"
@@ -118,6 +122,65 @@ TEST(MeshToLevelSet, VerticesNeedNotBeShared) {
   const auto soup = toBricks(meshToLevelSet(unshared(mesh), {.voxelSize = 0.05}));
   EXPECT_EQ(shared->table(), soup->table());
   EXPECT_EQ(shared->values(), soup->values());
+}
+
+/// Two spheres, one inside the other: a wall.
+Mesh shellMesh(double radius, double wall) {
+  Mesh inner = icosphere(radius - wall, 5);
+  for (std::size_t f = 0; f < inner.faceCount(); ++f)
+    std::swap(inner.corners[3 * f], inner.corners[3 * f + 1]);
+  return joined(icosphere(radius, 5), inner);
+}
+
+// Between 0.43 and 0.46 of a voxel the sum of shares is the wall's volume by chance, and marching cubes leave
+// a tenth of it.
+TEST(MeshToLevelSet, WallsThatMarchingCubesWouldLoseAreRefused) {
+  const double wall = 0.007;
+  for (const double voxels : {0.43, 0.445, 0.46}) try {
+      meshToLevelSet(shellMesh(1.0, wall), {.voxelSize = wall / voxels});
+      ADD_FAILURE() << voxels;
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find("too thin"), std::string::npos) << message;
+      double x = 0, y = 0, z = 0;
+      const std::size_t at = message.find("near (");
+      ASSERT_NE(at, std::string::npos) << message;
+      ASSERT_EQ(std::sscanf(message.c_str() + at, "near (%lf, %lf, %lf)", &x, &y, &z), 3);
+      // The middle of a brick that the sphere goes through: half its diagonal away at most.
+      EXPECT_NEAR(std::hypot(x, y, z), 1.0, 4 * std::sqrt(3.0) * wall / voxels) << message;
+      // The resolution that it names holds the wall.
+      int resolution = 0;
+      ASSERT_EQ(
+          std::sscanf(message.c_str() + message.find("try resolution"), "try resolution %d", &resolution), 1);
+      EXPECT_NO_THROW(meshToLevelSet(shellMesh(1.0, wall), {.voxelSize = 2.0 / resolution})) << resolution;
+    }
+}
+
+TEST(MeshToLevelSet, TheSurfaceEnclosesWhatMarchingCubesGive) {
+  const auto grid = meshToLevelSet(torusMesh(1.0, 0.4, 96, 48), {.voxelSize = 0.05});
+  const double mesh = signedVolume(marchingCubes(*toBricks(grid)));
+  EXPECT_NEAR(detail::isosurfaceVolume(grid) / mesh, 1, 1e-6);
+}
+
+// A factor of 2^-17 changes no digit of the mesh, and so none of the level set.
+TEST(MeshToLevelSet, TinyModelsAreLikeLargeOnes) {
+  const double tiny = std::ldexp(1.0, -17);
+  for (const bool crossing : {false, true}) {
+    Mesh large = crossing ? joined(icosphere(1, 3), icosphere(1, 3, {0.5, 0, 0})) : icosphere(1, 3),
+         small = large;
+    for (Vec3d& p : small.positions) p = p * tiny;
+    const auto of = toBricks(meshToLevelSet(large, {.voxelSize = 0.0625}));
+    const auto small0 = meshToLevelSet(small, {.voxelSize = 0.0625 * tiny});
+    const VdbGridInfo info = describe(toVdb(meshToLevelSet(small, {.voxelSize = 0.0625 * tiny}),
+                                            {"surface", VdbGridInfo::Class::levelSet}));
+    EXPECT_FLOAT_EQ(info.voxelSize.x, float(0.0625 * tiny));
+    const auto to = toBricks(small0);
+    ASSERT_EQ(of->values().size(), to->values().size());
+    double worst = 0;
+    for (std::size_t i = 0; i != of->values().size(); ++i)
+      worst = std::max(worst, std::abs(double(of->values()[i]) - double(to->values()[i]) / tiny));
+    EXPECT_LT(worst, crossing ? 1e-6 : 1e-7);
+  }
 }
 
 TEST(MeshToLevelSet, OverlappingPartsBecomeTheirUnion) {
