@@ -3,13 +3,17 @@
 PACKAGES := $(shell cat cmake/packages.txt)
 FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
 LINT_PACKAGES := clang-format
+FUZZ_PACKAGES := clang libclang-rt-14-dev
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
 PREFIX := /usr/local
 # ON: warnings end the build.
 STRICT := OFF
+# How long each format is fuzzed, and which: all, or some as "obj vdb".
+SECONDS := 60
+FORMATS :=
 
-.PHONY: all deps build demo test test-sanitized test-farm bench docs format lint install clean
+.PHONY: all deps build demo test test-sanitized fuzz test-farm bench docs format lint install clean
 
 all: build
 
@@ -37,6 +41,14 @@ test-sanitized: deps
 	cmake --build build-asan --target nephele_grids_tests
 	LSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/lsan_suppressions.txt \
 	  build-asan/bin/nephele_grids_tests --gtest_brief=1
+
+# Every reader of files with inputs that clang's libFuzzer makes up; docs/limits.md says what came of it.
+fuzz: deps
+	@dpkg -s $(FUZZ_PACKAGES) >/dev/null 2>&1 || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(FUZZ_PACKAGES)
+	cmake --preset fuzz
+	cmake --build build-fuzz --target nephele_fuzz
+	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
 
 # Starts a Slurm of its own, as root; not part of `make test`.
 test-farm: build
@@ -66,4 +78,4 @@ install: build
 	cmake --install build --prefix $(PREFIX)
 
 clean:
-	rm -rf build build-debug build-asan build-tsan bench-results
+	rm -rf build build-debug build-asan build-fuzz build-tsan bench-results

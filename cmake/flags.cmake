@@ -13,8 +13,13 @@ if(NEPHELE_SANITIZE STREQUAL "address")
 elseif(NEPHELE_SANITIZE STREQUAL "thread")
   add_compile_options(-fsanitize=thread)
   add_link_options(-fsanitize=thread)
+elseif(NEPHELE_SANITIZE STREQUAL "fuzzer")
+  add_compile_options(-fsanitize=address,undefined,fuzzer-no-link -fno-omit-frame-pointer -fno-sanitize-recover=undefined
+    -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/cmake/sanitizer_ignorelist.txt)
+  add_compile_definitions(HWY_COMPILE_ONLY_STATIC)
+  add_link_options(-fsanitize=address,undefined)
 elseif(NEPHELE_SANITIZE)
-  message(FATAL_ERROR "NEPHELE_SANITIZE must be empty, address or thread, got '${NEPHELE_SANITIZE}'")
+  message(FATAL_ERROR "NEPHELE_SANITIZE must be empty, address, thread or fuzzer, got '${NEPHELE_SANITIZE}'")
 endif()
 
 # For sources whose JSON is slow to optimise, and that nobody waits for.

@@ -75,8 +75,10 @@ std::map<std::string, std::string> Run::metadata() const {
 
 void Run::requireMemory(double estimatedBytes, const std::string& remedy) const {
   require(estimatedBytes <= memoryLimitBytes,
-          fmt::format("this needs about {} of memory and may use {}; {} or raise --memory-limit",
-                      inUnits(estimatedBytes), inUnits(memoryLimitBytes), remedy));
+          fmt::format(
+              "this needs {} of memory and may use {}; {} or raise --memory-limit",
+              std::isfinite(estimatedBytes) ? "about " + inUnits(estimatedBytes) : "more than can be told",
+              inUnits(memoryLimitBytes), remedy));
 }
 
 ProgramRun::ProgramRun(std::string verb, const CommonOptions& options)

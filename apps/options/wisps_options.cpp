@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/io/point_io.h"
@@ -77,11 +78,14 @@ std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
           input + ": has no faces to scatter guides on; --on vertices puts one on each of its points");
   const double side = double(boxOf(mesh).longestSide());
   options.standard.size = float(size.worldUnits(side));
+  require(std::isfinite(side), input + ": its points lie further apart than numbers of 32 bits can hold");
   // A single point has no extent that a share could be taken of.
   require(options.standard.size > 0, input + ": its points lie in one place; give --size in world units");
   run.begin("scatter");
-  if (where == On::vertices) return guidesOnVertices(mesh, options);
-  return where == On::surface ? guidesOnSurface(mesh, options) : inMesh(input, mesh, options, run);
+  return namingFile(input, [&] {
+    if (where == On::vertices) return guidesOnVertices(mesh, options);
+    return where == On::surface ? guidesOnSurface(mesh, options) : inMesh(input, mesh, options, run);
+  });
 }
 
 WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) const {
@@ -99,6 +103,8 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) c
                   float(displacementRoughness)},
        .seed = std::uint32_t(seed)};
   const double side = double(wispBox(made, w).longestSide());
+  require(std::isfinite(side), (input.empty() ? "" : input + ": ") +
+                                   std::string("wisps: they reach further than numbers of 32 bits can hold"));
   DotVolumeOptions& d = result.dots;
   d.voxelSize = float(voxelSize.value > 0 ? voxelSize.worldUnits(side) : side / resolution);
   // A smear is soft as it is, and large dots make it dear.

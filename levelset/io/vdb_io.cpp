@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
+#include "nephele/levelset/io/detail/vdb_check.h"
 #include "nephele/levelset/io/output_file.h"
 
 namespace nephele {
@@ -137,6 +138,9 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
   for (const VdbGrid& grid : grids) {
     // Shares the tree: only the metadata of what is written differs.
     openvdb::GridBase::Ptr copy = grid.impl().grid->copyGrid();
+    // Their values were not read and would be lost.
+    require(detail::isCheckable(*copy), fmt::format("{}: the grid '{}' of {} cannot be written", path,
+                                                    copy->getName(), copy->valueType()));
     for (const auto& other : labelled)
       require(other->getName() != copy->getName(),
               fmt::format("{}: two grids are called '{}'", path, copy->getName()));

@@ -122,8 +122,8 @@ VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label);
 VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)
-/// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path; no partial file
-/// stays.
+/// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path, also for
+/// grids of points, whose values are not read; no partial file stays.
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
                   const std::map<std::string, std::string>& metadata);
 

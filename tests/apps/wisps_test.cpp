@@ -96,6 +96,27 @@ TEST_F(WispsVerb, TakesPointsWithWhatTheyCarry) {
   EXPECT_NEAR(sum.x, 3, 0.25);
 }
 
+TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
+  const auto error = [&](const std::string& name, const std::string& text) {
+    std::ofstream(file(name)) << text;
+    const ProgramResult result =
+        wisps("w.vdb", file(name) + " --on vertices --guides 2 --dots 20 --resolution 8");
+    EXPECT_EQ(result.exitCode, 1);
+    return result.errors;
+  };
+  const auto line = [&](const std::string& name, const std::string& fault) {
+    return "nephele wisps: error: " + file(name) + ": " + fault + "\n";
+  };
+  EXPECT_EQ(error("far.obj", "v 0 0 0\nv 1e39 0 0\n"),
+            line("far.obj", "its points lie further apart than numbers of 32 bits can hold"));
+  EXPECT_EQ(error("wide.obj", "v 3.39e38 0 0\nv 2e38 0 0\n"),
+            line("wide.obj", "wisps: they reach further than numbers of 32 bits can hold"));
+  EXPECT_EQ(error("sized.ply",
+                  "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                  "property float z\nproperty float radius\nend_header\n0 0 0 1\n1 0 0 -1\n"),
+            line("sized.ply", "guides: vertex 1 has the size -1.000000, which must be > 0 and finite"));
+}
+
 TEST_F(WispsVerb, ScattersGuidesOnAMeshAndInsideIt) {
   const std::string sphere = ownData("data/sphere_uv.obj");
   const std::string tiny = sphere + " --guides 300 --dots 20 --size 0.001 --resolution 200 --points ";

@@ -12,7 +12,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <ranges>
 
 #include "nephele/levelset/grid/disjoint_sets.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
@@ -104,7 +103,9 @@ int containment(const Mesh& mesh, const PartShape& outer, const PartShape& inner
   if (!boxHolds(outer, inner)) return 0;
   const auto face = mesh.face(inner.faces.front());
   const Vec3d point = (mesh.positions[face[0]] + mesh.positions[face[1]] + mesh.positions[face[2]]) / 3.0;
-  const auto triangles = outer.faces | std::views::transform([&](std::uint32_t f) { return mesh.face(f); });
+  std::vector<std::span<const std::uint32_t>> triangles;
+  triangles.reserve(outer.faces.size());
+  for (const std::uint32_t f : outer.faces) triangles.push_back(mesh.face(f));
   return static_cast<int>(std::lround(windingNumber(mesh.positions, triangles, point)));
 }
 

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <random>
 
@@ -138,6 +140,37 @@ TEST(VdbInstances, HaveTheValuesOfTheGridWhoseTreeTheyShare) {
   std::uint64_t parents = 0;
   for (const VdbGrid& grid : readVdbFile(path)) parents += describe(grid).activeVoxels == copy.activeVoxels;
   EXPECT_EQ(parents, 2u);
+}
+
+// Points are described by what the file says of them; nothing here reads their values, so nothing can write
+// them.
+TEST_F(VdbDamage, GridsOfPointsAreDescribedButNotWritten) {
+  const std::string type = "Tree_float_5_4_3", points = "Tree_ptdataidx32_5_4_3";
+  const std::size_t name = whole_.find(type);
+  ASSERT_NE(name, std::string::npos);
+  // Behind the type stand the name of a parent, which is empty, and three places in the file, which all move.
+  std::string bytes = with(whole_, name - 4, std::uint32_t(points.size()));
+  const std::size_t longer = points.size() - type.size();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t place = name + type.size() + 4 + 8 * i;
+    bytes = with(bytes, place, at<std::uint64_t>(place) + longer);
+  }
+  bytes.replace(name, type.size(), points);
+  std::ofstream(folder_.file("points.vdb"), std::ios::binary) << bytes;
+
+  const std::vector<VdbGrid> grids = readVdbFile(folder_.file("points.vdb"));
+  ASSERT_EQ(grids.size(), 1u);
+  EXPECT_EQ(describe(grids[0]).type, "ptdataidx32");
+  EXPECT_EQ(describe(grids[0]).activeVoxels,
+            describe(readScalarGrid(folder_.file("whole.vdb"))).activeVoxels);
+  const std::string copy = folder_.file("copy.vdb");
+  EXPECT_THROW(
+      try { writeVdbFile(copy, grids, {}); } catch (const Error& e) {
+        EXPECT_EQ(std::string(e.what()), copy + ": the grid 'surface' of ptdataidx32 cannot be written");
+        throw;
+      },
+      Error);
+  EXPECT_FALSE(std::filesystem::exists(copy));
 }
 
 TEST_F(VdbDamage, NodesThatOverlapAreRefused) {

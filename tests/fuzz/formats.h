@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+// What is fuzzed: one kind of file after the other, each read and then used as the program uses it.
+namespace nephele::fuzz {
+
+/// One input, on disk and in memory.
+struct Input {
+  std::string path;
+  std::string_view bytes;
+  /// Another number for other bytes: decides what is done with what was read.
+  std::uint64_t hash = 0;
+
+  std::string extension() const { return path.substr(path.rfind('.')); }
+};
+
+using Bytes = std::span<std::uint8_t>;
+
+/// Changes the first `size` of `bytes`, of which all may be used; returns the new size.
+using Mutator = std::size_t (*)(Bytes bytes, std::size_t size, unsigned seed);
+
+struct Format {
+  std::string_view name;
+  std::string_view extension;
+  void (*use)(const Input& input);
+  /// Of formats that bytes changed at random never get into.
+  Mutator mutator = nullptr;
+};
+
+std::span<const Format> formats();
+
+/// Writes small files of every format into `folder`/`name of the format`.
+void writeSeeds(const std::string& folder);
+
+void useMesh(const Input& input);
+void useVolume(const Input& input);
+void usePicture(const Input& input);
+void useDeepPicture(const Input& input);
+void useCamera(const Input& input);
+void useToml(const Input& input);
+void useFieldTexts(const Input& input);
+/// The bytes are no file but say which calls write some, in which order.
+void useCalls(const Input& input);
+
+}  // namespace nephele::fuzz

@@ -1,0 +1,104 @@
+// One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`.
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <memory>
+
+#include "nephele/modeling/base/system.h"
+#include "tests/fuzz/formats.h"
+#include "tests/fuzz/harness.h"
+#include "tests/fuzz/mutators.h"
+
+namespace nephele::fuzz {
+namespace {
+
+constexpr Format kFormats[] = {
+    {"obj", ".obj", useMesh},
+    {"ply", ".ply", useMesh},
+    {"stl", ".stl", useMesh},
+    {"off", ".off", useMesh},
+    {"gltf", ".gltf", useMesh},
+    {"glb", ".glb", useMesh, mutateGlb},
+    {"vdb", ".vdb", useVolume, mutateBlocks},
+    {"nvdb", ".nvdb", useVolume, mutateNanoVdb},
+    {"exr", ".exr", usePicture, mutateBlocks},
+    {"deep", ".exr", useDeepPicture, mutateBlocks},
+    {"hdr", ".hdr", usePicture},
+    {"png", ".png", usePicture, mutatePng},
+    {"chan", ".chan", useCamera},
+    {"camera", ".json", useCamera},
+    {"toml", ".toml", useToml},
+    {"field", ".txt", useFieldTexts},
+    {"calls", ".bin", useCalls},
+};
+
+const Format* chosen = nullptr;
+
+const Format* formatCalled(std::string_view name) {
+  for (const Format& format : kFormats)
+    if (format.name == name) return &format;
+  return nullptr;
+}
+
+std::uint64_t hashOf(std::string_view bytes) {
+  std::uint64_t hash = 14695981039346656037u;
+  for (const char c : bytes) hash = (hash ^ std::uint8_t(c)) * 1099511628211u;
+  return hash ^ (hash >> 29);
+}
+
+}  // namespace
+
+std::span<const Format> formats() {
+  return kFormats;
+}
+
+}  // namespace nephele::fuzz
+
+extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
+  using namespace nephele::fuzz;
+  nephele::returnLargeBlocksAtOnce();
+  // One thread: what is reached depends on the input alone.
+  static const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  int kept = 1;
+  for (int i = 1; i < *argc; ++i) {
+    const std::string_view argument = (*argv)[i];
+    if (argument.starts_with("--format=")) {
+      chosen = formatCalled(argument.substr(9));
+    } else if (argument.starts_with("--write-seeds=")) {
+      writeSeeds(std::string(argument.substr(14)));
+      std::exit(0);
+    } else {
+      (*argv)[kept++] = (*argv)[i];
+    }
+  }
+  if (!chosen) {
+    std::string names;
+    for (const Format& format : kFormats) names += fmt::format("{}{}", names.empty() ? "" : "|", format.name);
+    std::fprintf(stderr, "nephele_fuzz: --format=%s, or --write-seeds=FOLDER\n", names.c_str());
+    std::exit(2);
+  }
+  *argc = kept;
+  return 0;
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace nephele::fuzz;
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  const Input input{scratchPath(fmt::format("input{}", chosen->extension)), bytes, hashOf(bytes)};
+  std::ofstream(input.path, std::ios::binary | std::ios::trunc) << bytes;
+  chosen->use(input);
+  return 0;
+}
+
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
+
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most,
+                                               unsigned seed) {
+  using namespace nephele::fuzz;
+  if (chosen->mutator && seed % 4 != 0) return chosen->mutator({data, most}, size, seed);
+  return LLVMFuzzerMutate(data, size, most);
+}

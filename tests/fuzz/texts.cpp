@@ -1,0 +1,141 @@
+// Files and options that people write.
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <cmath>
+#include <fstream>
+
+#include "apps/app.h"
+#include "apps/options/config_file.h"
+#include "apps/options/field_sources.h"
+#include "apps/options/field_value.h"
+#include "apps/options/layer_recipe.h"
+#include "apps/options/velocity_options.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/modeling/base/printable.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/render/scene/camera_file.h"
+#include "tests/fuzz/formats.h"
+#include "tests/fuzz/harness.h"
+
+namespace nephele::fuzz {
+namespace {
+
+class SilentRun : public apps::Run {
+ public:
+  void expect(double, double, int) const override {}
+  void detail(std::string_view) const override {}
+  void result(const std::string&) const override {}
+};
+
+/// As `succeeds`, where a fault of usage is an answer too.
+template <class Work>
+bool isAccepted(std::string_view named, const Work& work) {
+  try {
+    return succeeds(named, work);
+  } catch (const CLI::ParseError& error) {
+    // What the program says of it: options are given with any bytes.
+    checkMessage(printable(error.what()), named);
+    return false;
+  }
+}
+
+const Mesh& mesh() {
+  static const Mesh mesh = triangulated(readMesh(ballMesh()));
+  return mesh;
+}
+
+apps::FieldSources sources(const apps::Run& run) {
+  return apps::FieldSources(mesh(), {.voxelSize = 0.2, .reach = 0.2}, run);
+}
+
+void sample(const auto& field) {
+  for (const Vec3f& point : {Vec3f{0.1f, 0.2f, 0.3f}, Vec3f{-0.5f, 0, 0}, Vec3f{1e9f, 0, -1e30f}})
+    field(point);
+  field.range({{-1, -1, -1}, {1, 1, 1}});
+}
+
+const std::vector<apps::Verb>& verbs() {
+  using namespace nephele::apps;
+  static const std::vector<Verb> all = {levelsetVerb(), cloudVerb(),  advectVerb(),
+                                        wispsVerb(),    meshVerb(),   cutVerb(),
+                                        transferVerb(), renderVerb(), turntableVerb()};
+  return all;
+}
+
+/// Parses arguments as a verb does; its body does not run.
+void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
+  CLI::App app(verb.summary, verb.name);
+  verb.bind(app);
+  app.allow_extras();
+  arguments = apps::withConfigFile(app, std::move(arguments));
+  std::reverse(arguments.begin(), arguments.end());
+  app.parse(std::move(arguments));
+}
+
+void useCameraMotion(const CameraMotion& motion) {
+  for (const double frame :
+       {motion.firstFrame(), 0.5 * (motion.firstFrame() + motion.lastFrame()), motion.lastFrame() + 0.5})
+    succeeds("", [&] { motion.at(frame); });
+}
+
+}  // namespace
+
+void useCamera(const Input& input) {
+  std::optional<CameraMotion> motion;
+  if (!succeeds(input.path, [&] { motion = readCameraFile(input.path); })) return;
+  useCameraMotion(*motion);
+  std::string text;
+  if (succeeds("", [&] { text = cameraJsonText(*motion); }))
+    expect(succeeds("", [&] { parseCameraJson(text, "again"); }),
+           "a camera that was written cannot be read: " + text);
+  if (succeeds("", [&] { text = chanText(*motion, 1.5); }))
+    expect(succeeds("", [&] { parseChan(text, "again"); }),
+           "a camera that was written cannot be read: " + text);
+  runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", "4x3", "--samples", "1", "--octaves",
+           "1", "--aov", "none", "--camera", input.path, "--frame", fmt::format("{}", motion->firstFrame())},
+          "");
+}
+
+void useToml(const Input& input) {
+  const SilentRun run;
+  isAccepted(input.path, [&] {
+    const auto recipes = apps::readLayerRecipe(input.path);
+    apps::FieldSources fields = sources(run);
+    for (const CumuloLayer& layer : apps::recipeLayers(recipes, CumuloFractal{}, fields)) {
+      sample(layer.noise);
+      sample(layer.amplitude * layer.billow);
+    }
+  });
+  const apps::Verb& verb = verbs()[input.hash % verbs().size()];
+  isAccepted("", [&] { parse(verb, {"--config", input.path}); });
+}
+
+void useFieldTexts(const Input& input) {
+  const std::string text(input.bytes);
+  const SilentRun run;
+  using Unit = apps::Quantity::Unit;
+  const Unit unit = input.hash % 3 == 0 ? Unit::number : input.hash % 3 == 1 ? Unit::length : Unit::frequency;
+  isAccepted("--value", [&] {
+    const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
+    apps::FieldSources fields = sources(run);
+    sample(fields.field(value));
+  });
+  isAccepted("--velocity", [&] {
+    apps::VelocityArguments velocity;
+    apps::parseVelocity("--velocity", text, velocity);
+    sample(velocity.field(1.0));
+  });
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  // CLI11 takes the first line of usage faults apart by itself; a file is not asked for.
+  for (const std::string& line : lines)
+    if (line.find("config") != line.npos) return;
+  isAccepted("", [&] { parse(verbs()[input.hash / 3 % verbs().size()], lines); });
+}
+
+}  // namespace nephele::fuzz

@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "tests/fuzz/formats.h"
+#include "tests/fuzz/harness.h"
+
+namespace nephele::fuzz {
+namespace {
+
+/// A tile stands for many voxels in a few bytes; grids of more are looked at but not turned into bricks.
+constexpr std::uint64_t kMostVoxels = 1 << 18;
+
+void sample(const ScalarField& field, const Box& box) {
+  const Vec3f middle = box.isEmpty() ? Vec3f{} : box.center();
+  for (const Vec3f& point : {middle, Vec3f{}, Vec3f{1e30f, -1e30f, 0}, box.min, box.max}) field(point);
+  field.range(box);
+}
+
+void useGrid(const VdbGrid& grid, const std::string& path) {
+  const VdbGridInfo info = describe(grid);
+  expect(info.indexMin.x <= info.indexMax.x || info.activeVoxels == 0, "active voxels without a box");
+  if (info.activeVoxels > kMostVoxels) return;
+  const auto extent = [](int low, int high) { return double(high) - low; };
+  // Bricks span the box of what is active.
+  if (std::max({extent(info.indexMin.x, info.indexMax.x), extent(info.indexMin.y, info.indexMax.y),
+                extent(info.indexMin.z, info.indexMax.z)}) > 1e4)
+    return;
+  if (valuesOf(grid) == VdbValues::scalar)
+    succeeds("", [&] { sample(gridField(toBricks(grid)), activeBox(grid)); });
+  if (valuesOf(grid) == VdbValues::vector) {
+    succeeds("", [&] {
+      for (const VdbGrid& component : vectorComponents(grid)) toBricks(component);
+    });
+    succeeds("", [&] { toVectorVoxels(grid); });
+  }
+  static_cast<void>(path);
+}
+
+/// What is written is read again as it was.
+void writeAndReadBack(const std::vector<VdbGrid>& grids) {
+  const std::string path = scratchPath("again.vdb");
+  std::filesystem::remove(path);
+  if (!succeeds(path, [&] { writeVdbFile(path, grids, {{"creator", "fuzz"}}); })) return;
+  std::vector<VdbGrid> back;
+  expect(succeeds(path, [&] { back = readVdbFile(path); }), "a volume that was written cannot be read");
+  expect(back.size() == grids.size(), "a volume that was written has another number of grids");
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    const VdbGridInfo before = describe(grids[i]), after = describe(back[i]);
+    expect(
+        before.type == after.type && before.activeVoxels == after.activeVoxels &&
+            before.notFinite == after.notFinite && before.indexMin.x == after.indexMin.x &&
+            before.indexMax.z == after.indexMax.z,
+        fmt::format(
+            "grid {} of {} is read as another than was written: {} of {} active voxels, {} of {} not finite",
+            i, before.type, after.activeVoxels, before.activeVoxels, after.notFinite, before.notFinite));
+  }
+}
+
+void runVerbs(const Input& input) {
+  const std::string &path = input.path, volume = scratchPath("out.vdb"), mesh = scratchPath("out.obj");
+  const std::string picture = scratchPath("out.exr");
+  switch (input.hash % 10) {
+    case 0:
+      runVerb({"mesh", path, "-o", mesh}, path);
+      break;
+    case 1:
+      runVerb({"mesh", path, "-o", mesh, "--adaptivity", "0.5"}, path);
+      break;
+    case 2:
+      runVerb({"render", path, "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1", "--aov",
+               "none"},
+              path);
+      break;
+    case 3:
+      runVerb({"render", ballFog(), path, "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1",
+               "--aov", "none", "--integrator", "path", "--spp", "1"},
+              path);
+      break;
+    case 4:
+      runVerb({"cloud", path, "-o", volume, "--resolution", "10", "--layers", "1"}, path);
+      break;
+    case 5:
+      runVerb({"advect", path, "-o", volume, "--velocity", "curl:amplitude=2%"}, path);
+      break;
+    case 6:
+      runVerb({"advect", ballFog(), "-o", volume, "--velocity", path}, path);
+      break;
+    case 7: {
+      const std::string folder = scratchPath("pieces");
+      runVerb({"cut", path, "-o", folder, "--random-planes", "1"}, path);
+      std::filesystem::remove_all(folder);
+      break;
+    }
+    case 8:
+      runVerb({"render", ballFog(), "--object", path, "-o", picture, "--size", "4x3", "--samples", "1",
+               "--octaves", "1", "--aov", "none"},
+              path);
+      break;
+    default:
+      runVerb({"cloud", ballMesh(), "-o", volume, "--resolution", "10", "--layers", "1", "--billow",
+               "mask:" + path + ":0.1,1"},
+              "");
+  }
+}
+
+}  // namespace
+
+void useVolume(const Input& input) {
+  succeeds(input.path, [&] { readVdbHeaders(input.path); });
+  runVerb({"info", input.path}, input.path);
+  std::vector<VdbGrid> grids;
+  if (!succeeds(input.path, [&] { grids = readVdbFile(input.path); })) return;
+  bool isSmall = true;
+  for (const VdbGrid& grid : grids) {
+    useGrid(grid, input.path);
+    isSmall = isSmall && describe(grid).memoryBytes < (1 << 24);
+  }
+  if (!isSmall) return;
+  writeAndReadBack(grids);
+  runVerbs(input);
+}
+
+}  // namespace nephele::fuzz
