@@ -103,8 +103,9 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) c
                   float(displacementRoughness)},
        .seed = std::uint32_t(seed)};
   const double side = double(wispBox(made, w).longestSide());
-  require(std::isfinite(side), (input.empty() ? "" : input + ": ") +
-                                   std::string("wisps: they reach further than numbers of 32 bits can hold"));
+  namingFile(input, [&] {
+    require(std::isfinite(side), "wisps: they reach further than numbers of 32 bits can hold");
+  });
   DotVolumeOptions& d = result.dots;
   d.voxelSize = float(voxelSize.value > 0 ? voxelSize.worldUnits(side) : side / resolution);
   // A smear is soft as it is, and large dots make it dear.

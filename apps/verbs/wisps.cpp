@@ -4,6 +4,7 @@
 #include "apps/options/wisps_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
@@ -32,7 +33,7 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
   run.begin("bake");
   Mesh points;
   if (!arguments.points.empty()) options.also = [&](const DotSpans& part) { append(points, pointsOf(part)); };
-  const DotVolume volume = bakeWisps(guides, options, run);
+  const DotVolume volume = namingFile(arguments.input, [&] { return bakeWisps(guides, options, run); });
 
   run.begin("write");
   auto metadata = run.metadata();

@@ -90,6 +90,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const Input input{scratchPath(fmt::format("input{}", chosen->extension)), bytes, hashOf(bytes)};
   std::ofstream(input.path, std::ios::binary | std::ios::trunc) << bytes;
+  setInput(bytes);
   chosen->use(input);
   return 0;
 }

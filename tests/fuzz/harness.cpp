@@ -52,7 +52,14 @@ std::shared_ptr<BrickGrid> ballBricks(float voxelSize) {
       {.voxelSize = voxelSize, .box = {{-1, -1, -1}, {1, 1, 1}}, .band = {-3 * voxelSize, 3 * voxelSize}});
 }
 
+/// Words in it may be in messages.
+std::string_view whole;
+
 }  // namespace
+
+void setInput(std::string_view bytes) {
+  whole = bytes;
+}
 
 void fail(std::string_view message) {
   std::fprintf(stderr, "FINDING: %.*s\n", int(message.size()), message.data());
@@ -72,7 +79,8 @@ void checkMessage(std::string_view message, std::string_view named) {
   for (const char* word :
        {"std::", "json.exception", "basic_string", "vector::", "_M_", "openvdb", "Imf", "nan MB",
         "toml::", "stoi", "stof", "map::at", "bad_alloc", "Assertion", "terminate"})
-    if (own.find(word) != own.npos) fail(fmt::format("words of a library in a message: {}", message));
+    if (own.find(word) != own.npos && whole.find(word) == whole.npos)
+      fail(fmt::format("words of a library in a message: {}", message));
   if (message.find('\n') != message.npos) fail(fmt::format("more than one line: {}", message));
   if (message.find(named) == message.npos) fail(fmt::format("{} is not named: {}", named, message));
 }

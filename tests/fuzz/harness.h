@@ -9,6 +9,9 @@
 // What may happen and what may not while an input is used.
 namespace nephele::fuzz {
 
+/// What is read next; what it says may be quoted in messages.
+void setInput(std::string_view bytes);
+
 /// Ends the process with a report that has `message` in it.
 [[noreturn]] void fail(std::string_view message);
 inline void expect(bool isTrue, std::string_view message) {

@@ -38,6 +38,7 @@ void writeAndReadBack(const Mesh& mesh, std::uint64_t hash) {
 
 void runVerbs(const Input& input) {
   const std::string &path = input.path, volume = scratchPath("out.vdb"), mesh = scratchPath("out.obj");
+  // Wraps take as long as their fineness asks for, however small the mesh; only `levelset` has coarse ones.
   switch (input.hash / 3 % 10) {
     case 0:
       runVerb({"levelset", path, "-o", volume, "--resolution", "8"}, path);
@@ -47,7 +48,8 @@ void runVerbs(const Input& input) {
       break;
     case 2: {
       const std::string folder = scratchPath("pieces");
-      runVerb({"cut", path, "-o", folder, "--random-planes", "2", "--seed", std::to_string(input.hash % 5)},
+      runVerb({"cut", path, "-o", folder, "--random-planes", "2", "--seed", std::to_string(input.hash % 5),
+               "--repair", "off"},
               path);
       std::filesystem::remove_all(folder);
       break;
@@ -59,7 +61,7 @@ void runVerbs(const Input& input) {
       runVerb({"mesh", path, "-o", mesh, "--smooth", "2", "--subdivide", "1"}, path);
       break;
     case 5:
-      runVerb({"cloud", path, "-o", volume, "--resolution", "10", "--layers", "1"}, path);
+      runVerb({"cloud", path, "-o", volume, "--resolution", "10", "--layers", "1", "--repair", "off"}, path);
       break;
     case 6:
       runVerb({"wisps", path, "-o", volume, "--guides", "2", "--dots", "200", "--resolution", "8"}, path);

@@ -1,7 +1,7 @@
 #!/bin/sh
 # run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
 # how many inputs it ran. What it learns stays in FOLDER/corpus and is where the next run begins; inputs that broke something
-# are in FOLDER/findings. Further files to begin from: FUZZ_FILES, folders of files that are sorted by their extensions.
+# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds, inputs, findings. Further files to begin from: FUZZ_FILES, folders of files that are sorted by their extensions.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2 seconds=$3
@@ -30,7 +30,7 @@ done
 
 # Memory: a file of some kilobytes may not cost more than this, in one block and in all.
 fuzz() {
-  format=$1
+  format=$1 begin=$(date +%s)
   mkdir -p "$folder/corpus/$format"
   dictionary="$here/dictionaries/$format.dict"
   [ -f "$dictionary" ] && dictionary="-dict=$dictionary" || dictionary=
@@ -42,6 +42,7 @@ fuzz() {
   # In lines that are written whole, as formats end at any time.
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$folder/logs/$format.log")
   printf '%-8s %12s inputs, findings: %s\n' "$format" "${runs:-?}" "$state"
+  printf '%s %s %s %s\n' "$format" $(($(date +%s) - begin)) "${runs:-0}" "$state" >> "$folder/history"
   [ "$state" = none ]
 }
 
