@@ -171,6 +171,21 @@ void CornerUvs::addTo(Mesh& mesh) {
 
 namespace {
 
+/// What a reader of the file would refuse is not written.
+void requireWritable(const Mesh& mesh, bool asTrianglesOfFloats) {
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const Vec3d& p = mesh.positions[v];
+    if (asTrianglesOfFloats ? !isFinite(Vec3f(p)) : !isFinite(p))
+      throw Error(
+          fmt::format("vertex {} is at {:g}, {:g}, {:g}, which this format cannot hold", v, p.x, p.y, p.z));
+  }
+  if (asTrianglesOfFloats) return;
+  for (std::size_t f = 0; f < mesh.faceCount(); ++f)
+    if (mesh.face(f).size() < 3)
+      throw Error(
+          fmt::format("face {} has {} corners; files hold faces of 3 and more", f, mesh.face(f).size()));
+}
+
 std::string lowerExtension(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -209,7 +224,7 @@ Mesh readMesh(const std::string& path) {
 }
 
 void writeMesh(const std::string& path, const Mesh& mesh) {
-  requireValid(mesh);
+  namingFile(path, [&] { requireWritable(requireValid(mesh), lowerExtension(path) == ".stl"); });
   const std::string extension = lowerExtension(path);
   void (*write)(std::FILE*, const Mesh&) = extension == ".obj"   ? detail::writeObj
                                            : extension == ".ply" ? detail::writePly

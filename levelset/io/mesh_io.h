@@ -18,7 +18,8 @@ Mesh readMesh(const std::string& path);
 
 /// Writes .obj, .ply (binary little-endian) or .stl (binary, no attributes) by extension, whole or not at
 /// all.
-/// @throws Error naming the path; also for an unknown extension.
+/// @throws Error naming the path; also for an unknown extension, coordinates that are not finite (.stl: as
+/// floats), and faces of fewer than three corners (not .stl, which has none of them).
 void writeMesh(const std::string& path, const Mesh& mesh);
 
 }  // namespace nephele

@@ -121,7 +121,7 @@ class Fields {
       if (std::find(names.begin(), names.end(), field) != names.end()) continue;
       std::string list;
       for (const char* name : names) list += (list.empty() ? "" : ", ") + std::string(name);
-      refuse(field, fmt::format("'{}' is not known; there are {}", field, list));
+      refuse(field, fmt::format("'{}' is not known; there are {}", printable(field, 60), list));
     }
   }
 
@@ -204,7 +204,7 @@ CameraMotion parseChan(const std::string& text, const std::string& name, const R
       double number = 0;
       const auto [stop, error] = std::from_chars(begin, end, number);
       if (error != std::errc() || stop != end || !std::isfinite(number))
-        fail(name, line, fmt::format("'{}' is not a number", word.substr(0, 60)));
+        fail(name, line, fmt::format("'{}' is not a number", printable(word, 60)));
       numbers.push_back(number);
       if (numbers.size() > 8) break;
     }

@@ -77,7 +77,7 @@ void writeMeshes(Calls& calls) {
   Mesh back;
   const bool isRead = succeeds(path, [&] { back = readMesh(path); });
   if (path.ends_with(".stl")) return;
-  expect(isRead || mesh.faceCount() == 0, "a mesh that was written cannot be read");
+  expect(isRead || mesh.faceCount() == 0, "a mesh that was written cannot be read: " + lastError());
   if (isRead)
     expect(back.corners == mesh.corners && back.faceStart == mesh.faceStart, "other faces are read");
 }
@@ -123,7 +123,8 @@ void writeVolumes(Calls& calls) {
     return;
   }
   std::vector<VdbGrid> back;
-  expect(succeeds(path, [&] { back = readVdbFile(path); }), "a volume that was written cannot be read");
+  expect(succeeds(path, [&] { back = readVdbFile(path); }),
+         "a volume that was written cannot be read: " + lastError());
   expect(back.size() == grids.size(), "a volume has another number of grids");
   for (std::size_t i = 0; i < grids.size(); ++i) {
     expect(describe(back[i]).activeVoxels == describe(grids[i]).activeVoxels, "other voxels are active");
@@ -159,7 +160,8 @@ void writePictures(Calls& calls) {
   expect(isWritten == std::filesystem::exists(path), "a picture that could not be written left a file");
   if (!isWritten) return;
   Image back;
-  expect(succeeds(path, [&] { back = readImage(path); }), "a picture that was written cannot be read");
+  expect(succeeds(path, [&] { back = readImage(path); }),
+         "a picture that was written cannot be read: " + lastError());
   expect(back.width == image.width && back.height == image.height, "a picture has another size");
 }
 
@@ -179,7 +181,8 @@ void writeDeepPictures(Calls& calls) {
   expect(isWritten == std::filesystem::exists(path), "a deep picture that could not be written left a file");
   if (!isWritten) return;
   DeepImage back;
-  expect(succeeds(path, [&] { back = readDeepExr(path); }), "a deep picture that was written cannot be read");
+  expect(succeeds(path, [&] { back = readDeepExr(path); }),
+         "a deep picture that was written cannot be read: " + lastError());
   expect(back.sampleCount() == image.sampleCount(), "a deep picture has other samples");
 }
 

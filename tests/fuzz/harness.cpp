@@ -85,6 +85,11 @@ void checkMessage(std::string_view message, std::string_view named) {
   if (message.find(named) == message.npos) fail(fmt::format("{} is not named: {}", named, message));
 }
 
+std::string& lastError() {
+  static std::string message;
+  return message;
+}
+
 bool runVerb(std::vector<std::string> arguments, std::string_view named) {
   using namespace nephele::apps;
   static const std::vector<Verb> verbs = {levelsetVerb(), cloudVerb(),  advectVerb(),

@@ -21,6 +21,9 @@ inline void expect(bool isTrue, std::string_view message) {
 /// A message for a person: one line, no words of libraries, and `named` in it.
 void checkMessage(std::string_view message, std::string_view named);
 
+/// What the last work that did not succeed said.
+std::string& lastError();
+
 /// Whether `work` ends without an Error. Anything else that it throws is a finding, and so is an Error that
 /// does not name `named`.
 template <class Work>
@@ -30,6 +33,7 @@ bool succeeds(std::string_view named, const Work& work) {
     return true;
   } catch (const Error& error) {
     checkMessage(error.what(), named);
+    lastError() = error.what();
     return false;
   }
 }

@@ -23,7 +23,7 @@ void writeAndReadBack(const Mesh& mesh, std::uint64_t hash) {
   Mesh back;
   if (!succeeds(path, [&] { back = readMesh(path); })) {
     expect(path.ends_with(".stl") || triangulated(mesh).faceCount() == 0,
-           "a mesh that was written cannot be read");
+           "a mesh that was written cannot be read: " + lastError());
     return;
   }
   if (path.ends_with(".stl")) {

@@ -25,7 +25,8 @@ void writeAndReadBack(Image image) {
   for (Image::Channel& channel : image.channels) channel.half = false;
   if (!succeeds(path, [&] { writeExr(path, image, ImageCamera{}); })) return;
   Image back;
-  expect(succeeds(path, [&] { back = readImage(path); }), "a picture that was written cannot be read");
+  expect(succeeds(path, [&] { back = readImage(path); }),
+         "a picture that was written cannot be read: " + lastError());
   expect(back.width == image.width && back.height == image.height &&
              back.channels.size() == image.channels.size(),
          "a picture that was written has another size");
@@ -90,7 +91,7 @@ void useDeepPicture(const Input& input) {
   if (succeeds(path, [&] { writeDeepExr(path, image, ImageCamera{}); })) {
     DeepImage back;
     expect(succeeds(path, [&] { back = readDeepExr(path); }),
-           "a deep picture that was written cannot be read");
+           "a deep picture that was written cannot be read: " + lastError());
     expect(back.sampleCount() == image.sampleCount(), "a deep picture that was written has other samples");
   }
   const std::string size = fmt::format("{}x{}", std::min(image.width, 16), std::min(image.height, 16));

@@ -1,7 +1,9 @@
 #!/bin/sh
 # run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
 # how many inputs it ran. What it learns stays in FOLDER/corpus and is where the next run begins; inputs that broke something
-# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds, inputs, findings. Further files to begin from: FUZZ_FILES, folders of files that are sorted by their extensions.
+# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds, inputs, findings.
+# FUZZ_FILES: further files to begin from, folders of files that are sorted by their extensions. FUZZ_SEED: repeats the same
+# inputs, as many as there is time for.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2 seconds=$3
@@ -37,7 +39,7 @@ fuzz() {
   ASAN_OPTIONS=quarantine_size_mb=16:allocator_release_to_os_interval_ms=500 \
   LSAN_OPTIONS=suppressions="$here/../support/lsan_suppressions.txt":print_suppressions=0 \
   "$program" --format="$format" -max_total_time="$seconds" -timeout=20 -malloc_limit_mb=300 -rss_limit_mb=1500 \
-    -print_final_stats=1 $dictionary -artifact_prefix="$folder/findings/$format-" \
+    -print_final_stats=1 -seed="${FUZZ_SEED:-0}" $dictionary -artifact_prefix="$folder/findings/$format-" \
     "$folder/corpus/$format" "$folder/seeds/$format" > "$folder/logs/$format.log" 2>&1 && state="none" || state="FOUND"
   # In lines that are written whole, as formats end at any time.
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$folder/logs/$format.log")

@@ -28,15 +28,15 @@ class SilentRun : public apps::Run {
   void result(const std::string&) const override {}
 };
 
-/// As `succeeds`, where a fault of usage is an answer too.
+/// A fault of usage is an answer, too. The program shows messages as printable text.
 template <class Work>
-bool isAccepted(std::string_view named, const Work& work) {
+void mayFail(std::string_view named, const Work& work) {
   try {
-    return succeeds(named, work);
+    work();
   } catch (const CLI::ParseError& error) {
-    // What the program says of it: options are given with any bytes.
     checkMessage(printable(error.what()), named);
-    return false;
+  } catch (const Error& error) {
+    checkMessage(printable(error.what()), named);
   }
 }
 
@@ -101,7 +101,7 @@ void useCamera(const Input& input) {
 
 void useToml(const Input& input) {
   const SilentRun run;
-  isAccepted(input.path, [&] {
+  mayFail(input.path, [&] {
     const auto recipes = apps::readLayerRecipe(input.path);
     apps::FieldSources fields = sources(run);
     for (const CumuloLayer& layer : apps::recipeLayers(recipes, CumuloFractal{}, fields)) {
@@ -110,7 +110,7 @@ void useToml(const Input& input) {
     }
   });
   const apps::Verb& verb = verbs()[input.hash % verbs().size()];
-  isAccepted("", [&] { parse(verb, {"--config", input.path}); });
+  mayFail("", [&] { parse(verb, {"--config", input.path}); });
 }
 
 void useFieldTexts(const Input& input) {
@@ -118,12 +118,12 @@ void useFieldTexts(const Input& input) {
   const SilentRun run;
   using Unit = apps::Quantity::Unit;
   const Unit unit = input.hash % 3 == 0 ? Unit::number : input.hash % 3 == 1 ? Unit::length : Unit::frequency;
-  isAccepted("--value", [&] {
+  mayFail("--value", [&] {
     const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
     apps::FieldSources fields = sources(run);
     sample(fields.field(value));
   });
-  isAccepted("--velocity", [&] {
+  mayFail("--velocity", [&] {
     apps::VelocityArguments velocity;
     apps::parseVelocity("--velocity", text, velocity);
     sample(velocity.field(1.0));
@@ -137,7 +137,7 @@ void useFieldTexts(const Input& input) {
   // CLI11 takes the first line of usage faults apart by itself; a file is not asked for.
   for (const std::string& line : lines)
     if (line.find("config") != line.npos) return;
-  isAccepted("", [&] { parse(verbs()[input.hash / 3 % verbs().size()], lines); });
+  mayFail("", [&] { parse(verbs()[input.hash / 3 % verbs().size()], lines); });
 }
 
 }  // namespace nephele::fuzz

@@ -45,7 +45,8 @@ void writeAndReadBack(const std::vector<VdbGrid>& grids) {
   std::filesystem::remove(path);
   if (!succeeds(path, [&] { writeVdbFile(path, grids, {{"creator", "fuzz"}}); })) return;
   std::vector<VdbGrid> back;
-  expect(succeeds(path, [&] { back = readVdbFile(path); }), "a volume that was written cannot be read");
+  expect(succeeds(path, [&] { back = readVdbFile(path); }),
+         "a volume that was written cannot be read: " + lastError());
   expect(back.size() == grids.size(), "a volume that was written has another number of grids");
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const VdbGridInfo before = describe(grids[i]), after = describe(back[i]);

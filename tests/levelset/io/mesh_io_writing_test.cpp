@@ -2,8 +2,11 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <limits>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_attributes.h"
 #include "tests/support/run_program.h"
 
@@ -27,6 +30,33 @@ Mesh decorated() {
       {"color", MeshAttribute::Domain::vertex, 3, {0, 1, 0.2f, 1, 0, 0, 1, 1, 1, 0, 0, 0, 0.4f, 0.6f, 0.8f}});
   mesh.attributes.push_back({"mass", MeshAttribute::Domain::vertex, 1, {1, 2, 3, 4, 5}});
   return mesh;
+}
+
+TEST(MeshIo, WhatCouldNotBeReadIsNotWritten) {
+  const TemporaryFolder folder;
+  Mesh far = decorated(), open = decorated();
+  far.positions[1].y = 1e39;
+  open.addFace({});
+  const auto errorOf = [&](const std::string& name, const Mesh& mesh) -> std::string {
+    const std::string path = folder.file(name);
+    try {
+      writeMesh(path, mesh);
+    } catch (const Error& error) {
+      EXPECT_FALSE(std::filesystem::exists(path));
+      return std::string(error.what()).substr(path.size());
+    }
+    EXPECT_NO_THROW(readMesh(path));
+    return "";
+  };
+  // Beyond the largest float, and far below the largest double.
+  EXPECT_EQ(errorOf("a.stl", far), ": vertex 1 is at 0.1, 1e+39, 0, which this format cannot hold");
+  EXPECT_EQ(errorOf("a.obj", far), "");
+  EXPECT_EQ(errorOf("a.ply", far), "");
+  far.positions[1].y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(errorOf("b.obj", far), ": vertex 1 is at 0.1, nan, 0, which this format cannot hold");
+  EXPECT_EQ(errorOf("b.ply", open), ": face 3 has 0 corners; files hold faces of 3 and more");
+  EXPECT_EQ(errorOf("c.obj", open), ": face 3 has 0 corners; files hold faces of 3 and more");
+  EXPECT_EQ(errorOf("b.stl", open), "");
 }
 
 TEST(MeshIo, ObjRoundTripKeepsEverythingItCanHold) {
