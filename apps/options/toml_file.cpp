@@ -4,10 +4,11 @@
 
 #include <CLI/App.hpp>
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele::apps {
 namespace {
@@ -57,16 +58,12 @@ int lineOfDeepKey(const std::string& toml) {
 }  // namespace
 
 toml::table readToml(const std::string& option, const std::string& path) {
-  if (std::filesystem::is_directory(path))
-    throw CLI::ValidationError(option, path + ": is a folder, not a TOML file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file.good()) throw CLI::ValidationError(option, path + ": cannot be opened for reading");
-  // No more than that is read of what has no end.
-  std::string toml(kLargest + 1, '\0');
-  file.read(toml.data(), std::streamsize(toml.size()));
-  toml.resize(std::size_t(file.gcount()));
-  if (toml.size() > kLargest)
-    throw CLI::ValidationError(option, fmt::format("{}: is larger than {} bytes", path, kLargest));
+  std::string toml;
+  try {
+    toml = readTextFile(path, kLargest);
+  } catch (const Error& error) {
+    throw CLI::ValidationError(option, error.what());
+  }
   if (const int line = lineOfDeepKey(toml))
     throw CLI::ValidationError(option,
                                fmt::format("{}:{}: a key nests more than {} deep", path, line, kDeepest));

@@ -11,7 +11,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -19,6 +18,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/printable.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele {
 
@@ -175,18 +175,6 @@ CameraKey keyOf(const Fields& fields, const RotationOrder& order, double filmWid
   return key;
 }
 
-std::string contentOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text;
-  std::vector<char> block(1 << 16);
-  while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0) {
-    text.append(block.data(), std::size_t(file.gcount()));
-    require(text.size() <= kMostBytes, path + ": is larger than a camera file can be (64 MB)");
-  }
-  require(file.eof() && !file.bad(), path + ": cannot be read");
-  return text;
-}
-
 }  // namespace
 
 CameraMotion parseChan(const std::string& text, const std::string& name, const RotationOrder& order) {
@@ -285,7 +273,7 @@ CameraMotion readCameraFile(const std::string& path, const RotationOrder& order)
                  [](unsigned char c) { return std::tolower(c); });
   require(extension == ".chan" || extension == ".json",
           path + ": is not a camera file of a kind that is known (.chan, .json)");
-  const std::string text = contentOf(path);
+  const std::string text = readTextFile(path, kMostBytes);
   return extension == ".chan" ? parseChan(text, path, order) : parseCameraJson(text, path);
 }
 

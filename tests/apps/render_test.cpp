@@ -309,7 +309,7 @@ TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
                {chan + "--rotation-order XYX", 2, "--rotation-order"},
                {"--camera " + files.file("bad.chan"), 1, "bad.chan:2: 'zero' is not a number"},
                {"--camera " + files.file("bad.json"), 1, "bad.json:2: "},
-               {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be read"},
+               {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be opened for reading"},
                {"--camera " + fog(), 1, ".chan, .json"}};
   for (const auto& c : cases) {
     const ProgramResult result = runProgram(start + c.arguments);

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace nephele {
+
+/// All bytes of a file; of what has no end, such as a device, no more than `mostBytes` are read.
+/// @throws Error naming the path if it cannot be read, is a folder, or is longer.
+std::string readTextFile(const std::string& path, std::size_t mostBytes);
+
+}  // namespace nephele

@@ -1,0 +1,41 @@
+#include "nephele/modeling/base/text_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "nephele/modeling/base/error.h"
+#include "tests/support/run_program.h"
+
+namespace nephele {
+namespace {
+
+std::string errorOf(const std::string& path, std::size_t mostBytes) {
+  try {
+    readTextFile(path, mostBytes);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(TextFile, HoldsAllBytesOfAFile) {
+  const test::TemporaryFolder folder;
+  std::string text(200000, 'a');
+  text[100000] = '\0';
+  std::ofstream(folder.file("a.txt"), std::ios::binary) << text;
+  EXPECT_EQ(readTextFile(folder.file("a.txt"), text.size()), text);
+  EXPECT_EQ(readTextFile("/dev/null", 0), "");
+}
+
+TEST(TextFile, WhatCannotBeReadIsRefused) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.file("a.txt")) << "four";
+  EXPECT_EQ(errorOf(folder.file("a.txt"), 3), folder.file("a.txt") + ": is larger than 3 bytes");
+  EXPECT_EQ(errorOf("/dev/zero", 1 << 20), "/dev/zero: is larger than 1048576 bytes");
+  EXPECT_EQ(errorOf(folder.file("none"), 3), folder.file("none") + ": cannot be opened for reading");
+  EXPECT_EQ(errorOf(folder.file("."), 3), folder.file(".") + ": is a folder, not a file");
+}
+
+}  // namespace
+}  // namespace nephele
