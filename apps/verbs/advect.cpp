@@ -31,8 +31,9 @@ void carry(const AdvectArguments& arguments, Run& run) {
   require(!input.box.isEmpty(), arguments.input + ": no grid of numbers or vectors holds anything");
   if (!arguments.continueFrom.empty()) options.startMap = readFlowMap(arguments.continueFrom);
   const VectorField velocity = arguments.velocity.field(input.box.longestSide());
-  run.requireMemory(estimatedAdvectionBytes(input.bricks, options),
-                    "use a larger --map-coarseness, or larger voxels in the input");
+  run.requireMemory(
+      namingFile(arguments.input, [&] { return estimatedAdvectionBytes(input.bricks, options); }),
+      "use a larger --map-coarseness, or larger voxels in the input");
 
   run.begin("advect");
   run.expect(0.05, 0.9);

@@ -374,6 +374,7 @@ AdvectedGrids advectGrids(std::vector<GridHandle> grids, const VectorField& velo
 
 double estimatedAdvectionBytes(const std::vector<GridHandle>& grids, const AdvectionOptions& options) {
   constexpr double kSpread = 2, kBrickBytes = BrickGrid::kVolume * sizeof(float);
+  static_cast<void>(finestLattice(grids));
   double bricks = 0, held = 0, finest = 0;
   float voxel = 0;
   for (const GridHandle& grid : grids) {

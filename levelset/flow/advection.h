@@ -90,6 +90,7 @@ std::shared_ptr<const BrickGrid> throughMap(const std::shared_ptr<const BrickGri
                                             const Matter& matter, const Progress& progress = silent());
 
 /// Memory that `advectGrids` needs, bytes, if matter spreads to about twice the bricks that it fills now.
+/// @throws Error if no grid holds anything, as advectGrids does.
 double estimatedAdvectionBytes(const std::vector<std::shared_ptr<const BrickGrid>>& grids,
                                const AdvectionOptions& options);
 

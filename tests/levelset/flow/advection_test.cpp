@@ -300,6 +300,7 @@ TEST(Advection, RefusesWhatCannotBe) {
   EXPECT_THROW(advectGrids({ball}, u, {.rebakeShare = 2.0}), Error);
   const Grid empty = densityGrid(voxels(1), {0, 0, 0}, {1, 1, 1}, [](const Vec3f&) { return 0.0f; });
   EXPECT_THROW(advectGrids({empty}, u, {}), Error);
+  EXPECT_THROW(estimatedAdvectionBytes({empty}, {}), Error);
   for (const Method method : kMethods) {
     EXPECT_THROW(advectGrids({ball}, VectorField(Vec3f{1e6f, 0, 0}), {.method = method}), Error);
     // Noise far away is 0, where a midpoint might land: still too fast.
