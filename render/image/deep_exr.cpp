@@ -41,7 +41,9 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageC
     node.key() = "softwareVersion";
     attributes.insert(std::move(node));
   }
-  Imf::Header header = detail::exrHeader(image.width, image.height, image.display, camera, attributes);
+  Imf::Header header = namingFile(output.path(), [&] {
+    return detail::exrHeader(image.width, image.height, image.display, camera, attributes);
+  });
   header.setType(Imf::DEEPSCANLINE);
   header.compression() = Imf::ZIPS_COMPRESSION;
   Imf::addDeepImageState(header, Imf::DIS_TIDY);

@@ -23,6 +23,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
 #include "nephele/render/image/image_file.h"
@@ -125,7 +126,13 @@ Imf::Header detail::exrHeader(int width, int height, const std::optional<Image::
   Imf::addChromaticities(header, Imf::Chromaticities());
   Imf::addWorldToCamera(header, matrix(camera.worldToCamera));
   Imf::addWorldToNDC(header, matrix(camera.worldToNdc));
-  for (const auto& [name, value] : metadata) header.insert(name, Imf::StringAttribute(value));
+  for (const auto& [name, value] : metadata) {
+    try {
+      header.insert(name, Imf::StringAttribute(value));
+    } catch (const std::exception&) {
+      throw Error(fmt::format("'{}' cannot be the name of metadata", printable(name, 60)));
+    }
+  }
   return header;
 }
 
@@ -161,7 +168,9 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
   image.check();
   require(!image.channels.empty(), "exr: the image has no channels");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
-  Imf::Header header = detail::exrHeader(image.width, image.height, image.display, camera, metadata);
+  Imf::Header header = namingFile(output.path(), [&] {
+    return detail::exrHeader(image.width, image.height, image.display, camera, metadata);
+  });
 
   Imf::FrameBuffer frame;
   std::vector<std::vector<half>> halves;

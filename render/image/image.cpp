@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
+#include <string_view>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -35,10 +38,19 @@ const Image::Channel& Image::channel(const std::string& name) const {
 
 void Image::check() const {
   require(width > 0 && height > 0, fmt::format("image: has no pixels, its size is {}x{}", width, height));
-  for (const Channel& channel : channels)
+  std::set<std::string_view> names;
+  for (const Channel& channel : channels) {
+    // What OpenEXR takes.
+    constexpr std::size_t kLongest = 255;
+    require(!channel.name.empty(), "image: a channel has no name");
+    require(channel.name.size() <= kLongest && channel.name.find('\0') == std::string::npos,
+            fmt::format("image: '{}' cannot be the name of a channel", printable(channel.name, 60)));
+    require(names.insert(channel.name).second,
+            fmt::format("image: two channels are called '{}'", printable(channel.name, 60)));
     require(channel.values.size() == std::size_t(width) * std::size_t(height),
             fmt::format("image: the channel {} has {} values, but the size is {}x{}", channel.name,
                         channel.values.size(), width, height));
+  }
 }
 
 namespace {

@@ -160,5 +160,31 @@ TEST(ExrIo, KeepsWhereAPartOfAPictureBelongs) {
   EXPECT_FALSE(whole.display);
 }
 
+TEST(ExrIo, NamesThatTheFormatCannotHoldAreRefused) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.exr");
+  const auto errorOf = [&](const std::vector<std::string>& channels,
+                           const std::map<std::string, std::string>& metadata) -> std::string {
+    Image image;
+    image.width = image.height = 1;
+    for (const std::string& name : channels) image.add(name);
+    try {
+      writeExr(path, image, ImageCamera{}, metadata);
+    } catch (const Error& error) {
+      EXPECT_FALSE(std::filesystem::exists(path));
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(errorOf({""}, {}), "image: a channel has no name");
+  EXPECT_EQ(errorOf({"R", "R"}, {}), "image: two channels are called 'R'");
+  EXPECT_NE(errorOf({std::string(256, 'a')}, {}).find("cannot be the name of a channel"), std::string::npos);
+  EXPECT_EQ(errorOf({std::string("a\0b", 3)}, {}), "image: 'a\\x00b' cannot be the name of a channel");
+  EXPECT_EQ(errorOf({"R"}, {{"", "text"}}), path + ": '' cannot be the name of metadata");
+  // The format's own names have types of their own.
+  EXPECT_EQ(errorOf({"R"}, {{"dataWindow", "text"}}), path + ": 'dataWindow' cannot be the name of metadata");
+  EXPECT_EQ(errorOf({std::string(255, 'a')}, {{"note", "text"}}), "");
+}
+
 }  // namespace
 }  // namespace nephele
