@@ -43,8 +43,8 @@ struct Image {
   const Channel* find(const std::string& name) const;
   /// @throws Error naming the channel if it is not there.
   const Channel& channel(const std::string& name) const;
-  /// What writes or shows images begins with this. @throws Error naming what is wrong unless there are pixels,
-  /// every channel has width * height values, and a name of its own of up to 255 bytes.
+  /// What writes or shows images begins with this. @throws Error naming what is wrong unless there are
+  /// pixels, every channel has width * height values, and a name of its own of up to 255 bytes.
   void check() const;
   float at(const std::string& name, int x, int y) const {
     return channel(name).values[std::size_t(y) * width + x];
