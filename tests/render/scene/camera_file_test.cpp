@@ -231,6 +231,7 @@ TEST(CameraFile, SaysWhatIsWrongWithJsonAndWhere) {
       {"{\n\"frames\": [\n}", "a.json:3:", "is not JSON"},
       {"[1, 2]", "a.json:1:", "object with 'frames'"},
       {"{\n\"frame\": 3}", "a.json:2:", "'frame' is not known"},
+      {"{\"a\\nb\": 3}", "a.json:1:", "'a\\nb' is not known"},
       {"{}", "a.json:1:", "'frames'"},
       {frames(""), "a.json:2:", "holds no frames"},
       {frames("7"), "a.json:2:", "frames[0] must be an object"},
