@@ -35,7 +35,8 @@ FileBytes::int_type FileBytes::underflow() {
 std::streamsize FileBytes::xsgetn(char* target, std::streamsize count) {
   if (count < 0 || count > left()) failShort();
   const std::streamsize there = std::min<std::streamsize>(count, egptr() - gptr());
-  std::memcpy(target, gptr(), std::size_t(there));
+  // A block of nothing may have no memory to go to.
+  if (there > 0) std::memcpy(target, gptr(), std::size_t(there));
   setg(eback(), gptr() + there, egptr());
   if (const std::streamsize rest = count - there; rest >= kWindow) {
     readAt(position(), target + there, rest);

@@ -72,10 +72,10 @@ struct Reader : Handle {
 
 void writePng(const std::string& path, const Image& image, const ViewTransform& view,
               const std::map<std::string, std::string>& metadata) {
-  const auto width = std::size_t(image.width);
-  const std::vector<std::uint8_t> bytes = screenBytes(image, view);
   OutputFile output(path);
   try {
+    const auto width = std::size_t(image.width);
+    const std::vector<std::uint8_t> bytes = screenBytes(image, view);
     const File file(std::fopen(output.temporaryPath().c_str(), "wb"));
     require(file != nullptr, "the file cannot be opened");
     const Writer writer;

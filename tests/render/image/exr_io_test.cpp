@@ -101,6 +101,19 @@ TEST(ExrIo, RefusesAChannelThatHasNotAValueForEveryPixel) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
+TEST(ExrIo, NamesTheFileOfAPictureWithoutAlpha) {
+  const test::TemporaryFolder folder;
+  Image image = someImage();
+  std::erase_if(image.channels, [](const Image::Channel& channel) { return channel.name == "A"; });
+  try {
+    writePng(folder.file("a.png"), image, {});
+    ADD_FAILURE() << "a preview was made without alpha";
+  } catch (const Error& error) {
+    EXPECT_TRUE(std::string(error.what()).starts_with(folder.file("a.png"))) << error.what();
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
 TEST(ExrIo, NamesTheFileThatItCannotRead) {
   const test::TemporaryFolder folder;
   std::vector<std::string> paths{folder.file("missing.exr"), test::ownData("CMakeLists.txt")};
