@@ -138,11 +138,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostB
   result.render.volumeMotion = motionOf(volume);
   if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
     result.render.nextCamera = laterCamera(volume, 1);
-  result.path.aovs = result.render.aovs;
-  result.path.seed = result.render.seed = std::uint32_t(seed);
-  result.path.shutter = result.render.shutter;
-  result.path.volumeMotion = result.render.volumeMotion;
-  result.path.nextCamera = result.render.nextCamera;
+  result.render.seed = std::uint32_t(seed);
   return result;
 }
 
@@ -154,7 +150,11 @@ RenderOptions PictureOptions::marched(const Camera& camera) const {
 
 RenderResult PictureOptions::picture(const RenderVolume& volume, const Camera& camera,
                                      const Progress& progress) const {
-  if (pathTraced) return pathTraceImage(volume, medium, lights, camera, path, progress);
+  if (pathTraced) {
+    PathOptions options = path;
+    static_cast<FrameOptions&>(options) = render;
+    return pathTraceImage(volume, medium, lights, camera, options, progress);
+  }
   return renderImage(volume, medium, lights, camera, marched(camera), progress);
 }
 

@@ -28,7 +28,7 @@ struct PictureOptions : CameraOptions {
   RenderOptions render;
   bool samplesGiven = false;
   int seed = 0;
-  /// Path traces instead of marching; layers and seed are those of `render`.
+  /// Path traces instead of marching; what both have in common is taken from `render`.
   bool pathTraced = false;
   PathOptions path;
   ViewTransform screen;

@@ -24,7 +24,7 @@ std::size_t Film::channelCount(const std::vector<std::string>& layers, std::size
 
 Film::Film(const Camera& camera, const std::vector<std::string>& lights,
            const std::vector<std::string>& layers)
-    : lightCount_(lights.size()) {
+    : window_(camera.window()), lightCount_(lights.size()) {
   image_.setWindow(camera.window(), camera.width(), camera.height());
   for (const char* name : {"R", "G", "B", "A"}) image_.add(name);
   const std::vector<std::string> colours{"R", "G", "B"}, axes{"X", "Y", "Z"};
@@ -56,6 +56,18 @@ Film::Film(const Camera& camera, const std::vector<std::string>& lights,
       throw Error(fmt::format("aov: expected one of {}, got '{}'", names, layer));
     }
   }
+}
+
+Film::Film(const RenderScene& scene, const FilmOptions& options)
+    : Film(scene.camera, scene.lightNames(), options.aovs) {
+  options_ = options;
+  require(options.adaptiveThreshold >= 0 && options.adaptiveThreshold <= 1,
+          fmt::format("adaptive threshold: expected 0 to 1, got {}", options.adaptiveThreshold));
+  require(!(options.adaptiveThreshold > 0 && options.deep),
+          "adaptive threshold: deep pictures need every pixel to be marched");
+  if (options.deep)
+    deep_ = DeepImage{image_.width, image_.height, image_.display,
+                      std::vector<std::vector<DeepSample>>(image_.channels.front().values.size())};
 }
 
 int Film::addLayer(const std::string& name, const std::vector<std::string>& parts) {

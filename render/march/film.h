@@ -2,11 +2,14 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/image.h"
-#include "nephele/render/march/march_kernels.h"
+#include "nephele/render/march/render_options.h"
+#include "nephele/render/march/render_scene.h"
 #include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/lights.h"
 
@@ -38,7 +41,7 @@ struct PixelPoint {
   float motion[2] = {};
 };
 
-/// The channels of a picture and how a pixel fills them.
+/// The channels of a picture, its deep samples, and how a pixel fills them.
 ///
 /// R, G, B, A, and the layers asked for by name: "Z", "Z_median", "Z_mean", "normal" (N.X, N.Y, N.Z),
 /// "position" (P.X, P.Y, P.Z), "motion" (motion.X, motion.Y), "light" (light_<name>.R ...), "transmittance",
@@ -48,9 +51,20 @@ class Film {
   /// @param lights their names, in the order of PixelSum::light. @throws Error if a layer is unknown or named
   /// twice.
   Film(const Camera& camera, const std::vector<std::string>& lights, const std::vector<std::string>& layers);
+  /// With the lights and objects of `scene`. @throws Error as above, or if an option is outside its range.
+  Film(const RenderScene& scene, const FilmOptions& options);
+
+  const FilmOptions& options() const { return options_; }
+  /// The pixels of the picture that are here, and the place of one of them in what follows.
+  const PixelBox& window() const { return window_; }
+  std::size_t placeOf(int x, int y) const {
+    return std::size_t(y - window_.y0) * std::size_t(window_.width()) + std::size_t(x - window_.x0);
+  }
 
   void set(std::size_t at, const PixelSum& pixel);
   void set(std::size_t at, const PixelPoint& point);
+  /// The samples of a pixel, where options().deep asks for them.
+  void set(std::size_t at, std::vector<DeepSample> samples) { deep_->pixels[at] = std::move(samples); }
   /// Fills what PixelSum fills with the means of four pixels, Z with the nearest, where these agree: R, G and
   /// B within `threshold` of the brightest or of `faint`, A within `threshold`. Else does nothing and returns
   /// false.
@@ -59,8 +73,11 @@ class Film {
   bool wantsPoints() const { return medianDepth_ >= 0 || meanDepth_ >= 0 || wantsPositions(); }
   bool wantsPositions() const { return normal_ >= 0 || position_ >= 0 || motion_ >= 0; }
   bool wantsNormals() const { return normal_ >= 0; }
+  bool wantsDepth() const { return depth_ >= 0; }
 
   Image& image() { return image_; }
+  /// Nothing where options().deep does not ask for it.
+  std::optional<DeepImage>& deep() { return deep_; }
 
   /// Channels of `layers` where there are `lightCount` lights; unknown layers count as one.
   static std::size_t channelCount(const std::vector<std::string>& layers, std::size_t lightCount);
@@ -73,7 +90,10 @@ class Film {
   void setMeans(int first, int count, std::size_t at, const std::array<std::size_t, 4>& from);
   float& value(int channel, std::size_t at) { return image_.channels[std::size_t(channel)].values[at]; }
 
+  FilmOptions options_;
+  PixelBox window_;
   Image image_;
+  std::optional<DeepImage> deep_;
   std::size_t lightCount_;
   int depth_ = -1, medianDepth_ = -1, meanDepth_ = -1, normal_ = -1, position_ = -1, motion_ = -1;
   int transmittance_ = -1, albedo_ = -1, emission_ = -1, light_ = -1;

@@ -1,4 +1,5 @@
-// Pictures by random paths: tiles of pixels in parallel, and the layers beside the light.
+// Pictures by random paths. Layers that say where things are and not how they are lit come from a march
+// without light, so that they have no noise.
 //
 // Limits: suns that shine through a narrow forward peak make noise that falls slowly, since they are points
 // and no direction but the exact one finds them.
@@ -6,131 +7,128 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/base/parallel.h"
 #include "nephele/render/march/detail/path_tracer.h"
+#include "nephele/render/march/detail/picture.h"
 
 namespace nephele {
 
 namespace {
 
-constexpr int kTile = 8;
-float largest(const Vec3f& v) {
-  return std::max({v.x, v.y, v.z});
-}
-
-void check(const Medium& medium, const Lights& lights, const PathOptions& options) {
+void check(const PathOptions& options) {
   require(options.samplesPerPixel >= 1 && options.samplesPerPixel <= 1 << 20,
           fmt::format("spp: expected 1 to {}, got {}", 1 << 20, options.samplesPerPixel));
   require(options.maxScatterings >= 0,
           fmt::format("scatterings: expected 0 (no limit) or more, got {}", options.maxScatterings));
-  medium.check();
-  lights.check();
-  bool deep = lights.deepTolerance.has_value();
-  for (const DistantLight& sun : lights.suns) deep = deep || sun.deepShadow;
-  for (const LocalLight& light : lights.locals) deep = deep || light.deepShadow;
-  require(!deep, "path tracing: deep shadow maps can only be marched");
 }
 
-// Adds the layers of `aovs` to `image`; all that is no light comes from a march without light.
-void addLayers(Image& image, const RenderVolume& volume, const Medium& medium, const Lights& lights,
-               const Camera& camera, const PathOptions& pathOptions) {
-  const auto add = [&](const std::string& name) -> Image::Channel& {
-    require(!image.find(name), fmt::format("aov: {} is named twice", name));
-    return image.add(name, false);
-  };
-  for (const std::string& layer : pathOptions.aovs) {
-    if (layer == "transmittance") {
-      for (const char* c : {"R", "G", "B"}) add(std::string("transmittance.") + c);
-    } else if (layer == "light") {
-      for (const std::string& name : lights.names())
-        for (const char* c : {".R", ".G", ".B"}) add("light_" + name + c);
-    } else {
-      RenderOptions options;
-      options.octaves.count = 1;
-      options.shutter = pathOptions.shutter;
-      options.volumeMotion = pathOptions.volumeMotion;
-      options.nextCamera = pathOptions.nextCamera;
-      options.aovs = {layer};
-      Image marched = renderImage(volume, medium, {}, camera, options).image;
-      for (std::size_t i = 4; i != marched.channels.size(); ++i)
-        add(marched.channels[i].name).values = std::move(marched.channels[i].values);
-    }
+class PathIntegrator final : public Integrator {
+ public:
+  explicit PathIntegrator(const PathOptions& options) : options_(options) {
+    check(options);
+    static_cast<FrameOptions&>(sightOptions_) = options;
+    sightOptions_.deep.reset();
+    sightOptions_.octaves.count = 1;
   }
-}
+
+  const char* stage() const override { return "trace"; }
+  int tileSize() const override { return 8; }
+  int raysPerPixel() const override { return options_.samplesPerPixel; }
+
+  bool prepare(const RenderScene& scene, const Film& film, const Progress& progress) override {
+    require(film.options().adaptiveThreshold == 0, "adaptive threshold: path traced pixels are too noisy");
+    bool deep = scene.lights.deepTolerance.has_value();
+    for (const DistantLight& sun : scene.lights.suns) deep = deep || sun.deepShadow;
+    for (const LocalLight& light : scene.lights.locals) deep = deep || light.deepShadow;
+    require(!deep, "path tracing: deep shadow maps can only be marched");
+    require(!scene.surfaces, "path tracing: objects can only be marched");
+    require(!scene.holdout, "path tracing: holdouts can only be marched");
+    require(!film.options().deep, "path tracing: deep pictures can only be marched");
+    require(!scene.volume.field(),
+            "path tracing: needs a density that is a grid; fieldVolume makes one of a field");
+    if (!isSeen(scene.volume, scene.medium)) return false;
+    progress_ = &progress;
+    tracer_.emplace(scene, options_);
+    if (film.wantsDepth() || film.wantsPoints()) {
+      unlit_.emplace(scene.volume, scene.medium, Lights{}, sightOptions_.octaves, nullptr, progress, nullptr);
+      sight_.emplace(*unlit_, scene, sightOptions_, film);
+    }
+    albedo_ = scene.medium.albedo;
+    return true;
+  }
+
+  std::unique_ptr<TileWorker> worker() const override { return std::make_unique<Worker>(*this); }
+
+ private:
+  class Worker final : public TileWorker {
+   public:
+    explicit Worker(const PathIntegrator& of) : of_(of), scratch_(of.sightOptions_) {}
+
+    void integrate(const PixelBox& tile, Film& film) override {
+      for (int y = tile.y0; y != tile.y1; ++y)
+        for (int x = tile.x0; x != tile.x1; ++x) {
+          of_.progress_->check();
+          detail::PathSums sums;
+          of_.tracer_->pixel(x, y, sums);
+          samples += sums.scatterings;
+          rays += std::uint64_t(of_.options_.samplesPerPixel);
+          film.set(film.placeOf(x, y), sumOf(sums, film.wantsDepth() ? depthAt(x, y) : INFINITY));
+        }
+    }
+
+    void findPoints(const PixelBox& tile, Film& film) override {
+      of_.sight_->points(tile, scratch_);
+      const PixelPoint* point = scratch_.points.data();
+      for (int y = tile.y0; y != tile.y1; ++y)
+        for (int x = tile.x0; x != tile.x1; ++x) film.set(film.placeOf(x, y), *point++);
+    }
+
+   private:
+    float depthAt(int x, int y) {
+      of_.sight_->march(x, y, 1, scratch_);
+      of_.sight_->gather(0, scratch_);
+      return scratch_.sum.depth;
+    }
+
+    PixelSum sumOf(const detail::PathSums& sums, float depth) const {
+      const double share = 1.0 / of_.options_.samplesPerPixel;
+      PixelSum pixel;
+      pixel.depth = depth;
+      pixel.alpha = float((sums.opacity.x + sums.opacity.y + sums.opacity.z) / 3 * share);
+      pixel.opacity = Vec3f(sums.opacity * share);
+      pixel.albedo = pixel.opacity * of_.albedo_;
+      pixel.emission = Vec3f(sums.emission * share);
+      for (std::size_t i = 0; i != sums.light.size(); ++i) pixel.light[i] = Vec3f(sums.light[i] * share);
+      return pixel;
+    }
+
+    const PathIntegrator& of_;
+    detail::Picture::Scratch scratch_;
+  };
+
+  PathOptions options_;
+  // Of the march without light.
+  RenderOptions sightOptions_;
+  std::optional<detail::BakedLight> unlit_;
+  std::optional<detail::Picture> sight_;
+  std::optional<detail::PathTracer> tracer_;
+  const Progress* progress_ = nullptr;
+  Vec3f albedo_{};
+};
 
 }  // namespace
 
+std::unique_ptr<Integrator> pathIntegrator(const PathOptions& options) {
+  return std::make_unique<PathIntegrator>(options);
+}
+
 RenderResult pathTraceImage(const RenderVolume& volume, const Medium& medium, const Lights& lights,
                             const Camera& camera, const PathOptions& options, const Progress& progress) {
-  check(medium, lights, options);
-  require(!volume.field(), "path tracing: needs a density that is a grid; fieldVolume makes one of a field");
-  RenderResult result;
-  Image& image = result.image;
-  const PixelBox window = camera.window();
-  image.setWindow(window, camera.width(), camera.height());
-  const int width = image.width, height = image.height;
-  for (const char* name : {"R", "G", "B", "A"}) image.add(name);
-  addLayers(image, volume, medium, lights, camera, options);
-  result.rays = std::uint64_t(width) * std::uint64_t(height) * std::uint64_t(options.samplesPerPixel);
-  const auto indexOf = [&](const std::string& name) {
-    const auto at = std::find_if(image.channels.begin(), image.channels.end(),
-                                 [&](const Image::Channel& channel) { return channel.name == name; });
-    return at - image.channels.begin();
-  };
-  const auto end = std::ptrdiff_t(image.channels.size());
-  const auto through = indexOf("transmittance.R"), first = indexOf("light_" + lights.names()[0] + ".R");
-  if (through != end)
-    for (int c = 0; c != 3; ++c)
-      std::fill_n(image.channels[std::size_t(through + c)].values.begin(), std::size_t(width) * height, 1.0f);
-  if (volume.isEmpty() || medium.extinction * largest(medium.extinctionColour) == 0) return result;
-
-  const auto start = std::chrono::steady_clock::now();
-  progress.begin("trace");
-  const detail::PathTracer tracer(volume, medium, lights, camera, options);
-  const int across = (width + kTile - 1) / kTile, down = (height + kTile - 1) / kTile;
-  const double share = 1.0 / options.samplesPerPixel;
-  std::atomic<std::uint64_t> scatterings{0};
-  parallelFor(
-      std::size_t(across) * down, 1,
-      [&](std::size_t begin, std::size_t tileEnd) {
-        detail::PathSums sums;
-        for (std::size_t tile = begin; tile != tileEnd; ++tile) {
-          const int x0 = int(tile % std::size_t(across)) * kTile,
-                    y0 = int(tile / std::size_t(across)) * kTile;
-          for (int y = y0; y < std::min(y0 + kTile, height); ++y)
-            for (int x = x0; x < std::min(x0 + kTile, width); ++x) {
-              progress.check();
-              sums = {sums.scatterings, {}, {}, std::vector<Vec3d>(lights.names().size())};
-              tracer.pixel(window.x0 + x, window.y0 + y, sums);
-              const std::size_t at = std::size_t(y) * std::size_t(width) + std::size_t(x);
-              const auto set = [&](std::ptrdiff_t channel, double value) {
-                image.channels[std::size_t(channel)].values[at] = float(value * share);
-              };
-              set(3, (sums.opacity.x + sums.opacity.y + sums.opacity.z) / 3);
-              for (int c = 0; c != 3; ++c) {
-                double total = sums.emission[c];
-                for (const Vec3d& light : sums.light) total += light[c];
-                set(c, total);
-                if (through != end) set(through + c, double(options.samplesPerPixel) - sums.opacity[c]);
-                for (std::size_t i = 0; first != end && i != sums.light.size(); ++i)
-                  set(first + std::ptrdiff_t(3 * i) + c, sums.light[i][c]);
-              }
-            }
-        }
-        scatterings += sums.scatterings;
-      },
-      progress);
-  result.samples = scatterings;
-  progress.count("rays", double(result.rays));
-  progress.count("samples", double(result.samples));
-  result.marchSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
+  const RenderScene scene(volume, medium, lights, camera, options);
+  return render(scene, *pathIntegrator(options), Film(scene, options), progress);
 }
 
 }  // namespace nephele

@@ -1,38 +1,28 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
+#include <memory>
 
 #include "nephele/modeling/base/progress.h"
-#include "nephele/render/march/raymarch.h"
-#include "nephele/render/scene/camera_motion.h"
+#include "nephele/render/march/integrator.h"
+#include "nephele/render/march/render_options.h"
+#include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/lights.h"
 #include "nephele/render/scene/medium.h"
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele {
 
-/// How a picture is path traced.
-struct PathOptions {
+/// How a picture is path traced. Octaves and steps have no meaning here; `seed` chooses the random numbers.
+struct PathOptions : FrameOptions {
   /// Paths per pixel, 1 to 2^20. Noise falls with their square root.
   int samplesPerPixel = 64;
   /// Paths end at this scattering; 0: never, but for Russian roulette where little light is left. 1 is single
   /// scattering.
   int maxScatterings = 0;
-  /// Chooses the random numbers.
-  std::uint64_t seed = 0;
   /// Paths firstSample .. firstSample + samplesPerPixel - 1 of every pixel are traced, so that a picture can
   /// go on where another one of the same seed ended: the picture of N paths is the mean of the first N.
   std::uint64_t firstSample = 0;
-  /// As RenderOptions::aovs. All but the light and the transmittance are the marcher's.
-  std::vector<std::string> aovs{"Z"};
-  /// As RenderOptions::shutter and RenderOptions::volumeMotion.
-  Shutter shutter{};
-  std::optional<RigidMotion> volumeMotion{};
-  /// As RenderOptions::nextCamera.
-  std::optional<Camera> nextCamera{};
 };
 
 /// The same picture as renderImage with all scattering, without bias and with noise: what the marcher and its
@@ -46,5 +36,9 @@ struct PathOptions {
 RenderResult pathTraceImage(const RenderVolume& volume, const Medium& medium, const Lights& lights,
                             const Camera& camera, const PathOptions& options = {},
                             const Progress& progress = silent());
+
+/// What follows the paths of such a picture, for nephele::render. @throws Error if an option is outside its
+/// range.
+std::unique_ptr<Integrator> pathIntegrator(const PathOptions& options);
 
 }  // namespace nephele

@@ -26,10 +26,10 @@ std::optional<OpacityDistances> opacityDistances(const MarchRecord& record) {
   return result;
 }
 
-PixelMotion::PixelMotion(const Camera& camera, const Shutter& shutter,
-                         const std::optional<RigidMotion>& volumeMotion,
-                         const std::optional<Camera>& nextCamera)
-    : from_(camera.stillAt(0)), to_(camera.stillAt(1)), motion_(volumeMotion) {
+PixelMotion::PixelMotion(const Camera& camera, const Shutter& shutter, const RigidMotion* volumeMotion,
+                         const Camera* nextCamera)
+    : from_(camera.stillAt(0)), to_(camera.stillAt(1)) {
+  if (volumeMotion) motion_ = *volumeMotion;
   if (!shutter.isInstant()) {
     fromFrames_ = shutter.open;
     toFrames_ = shutter.close;

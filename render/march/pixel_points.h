@@ -23,8 +23,9 @@ std::optional<OpacityDistances> opacityDistances(const MarchRecord& record);
 /// that is an instant, to the camera of the next frame. Zero where nothing is said to move.
 class PixelMotion {
  public:
-  PixelMotion(const Camera& camera, const Shutter& shutter, const std::optional<RigidMotion>& volumeMotion,
-              const std::optional<Camera>& nextCamera);
+  /// Null where the volume stands still, and where no other camera follows.
+  PixelMotion(const Camera& camera, const Shutter& shutter, const RigidMotion* volumeMotion,
+              const Camera* nextCamera);
 
   /// Pixels to the right and down per frame of the point that is at `inVolume` at the frame itself; zero for
   /// points that are behind the camera at either time. `isStill`: of a point that the volume does not carry

@@ -5,7 +5,7 @@
 #include "nephele/modeling/base/math.h"
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/march/march_kernels.h"
-#include "nephele/render/march/raymarch.h"
+#include "nephele/render/march/render_options.h"
 
 namespace nephele::detail {
 

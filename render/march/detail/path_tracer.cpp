@@ -59,9 +59,16 @@ float largest(const Vec3f& v) {
 
 }  // namespace
 
-PathTracer::PathTracer(const RenderVolume& volume, const Medium& medium, const Lights& lights,
-                       const Camera& camera, const PathOptions& options)
-    : medium_(medium), lights_(lights), camera_(camera), options_(options) {
+PathTracer::PathTracer(const RenderScene& scene, const PathOptions& options)
+    : medium_(scene.medium),
+      lights_(scene.lights),
+      camera_(scene.camera),
+      shutter_(scene.shutter),
+      motion_(scene.volumeMotion),
+      options_(options) {
+  const RenderVolume& volume = scene.volume;
+  const Medium& medium = scene.medium;
+  const Lights& lights = scene.lights;
   // The extinction is that of the most opaque colour.
   medium_.extinction *= largest(medium.extinctionColour);
   colour_ = medium.extinctionColour / largest(medium.extinctionColour);
@@ -96,11 +103,12 @@ PathTracer::PathTracer(const RenderVolume& volume, const Medium& medium, const L
   latticeToWorld_ = {grid.indexToWorld().linear, grid.indexToWorld()(corner)};
   hasSky_ = lights.hasSky();
   skyMap_ = lights.map.get();
-  blurred_ = camera.hasLens() || camera.isMoving() || options.volumeMotion;
+  blurred_ = scene.isBlurred();
 }
 
 void PathTracer::pixel(int x, int y, PathSums& sums) const {
   const std::uint64_t index = std::uint64_t(y) * std::uint64_t(camera_.width()) + std::uint64_t(x);
+  sums.light.resize(suns_.size() + lights_.locals.size() + 1);
   PathRandom offset(options_.seed, index, ~std::uint64_t(0));
   const double u = double(offset.next()), v = double(offset.next());
   for (int i = 0; i != options_.samplesPerPixel; ++i) {
@@ -230,10 +238,7 @@ float PathTracer::valueAt(const MarchScene::Bricks& bricks, const Vec3f& p) {
 Ray PathTracer::blurredRay(double x, double y, PathRandom& random) const {
   const double u = double(random.next()), v = double(random.next()), time = double(random.next());
   const Ray ray = camera_.ray(x, y, u, v, time);
-  const Shutter& shutter = options_.shutter;
-  return options_.volumeMotion
-             ? options_.volumeMotion->toBody(ray, shutter.open + time * (shutter.close - shutter.open))
-             : ray;
+  return motion_ ? motion_->toBody(ray, shutter_.open + time * (shutter_.close - shutter_.open)) : ray;
 }
 
 bool PathTracer::enter(const Ray& ray, LatticeRay& out) const {

@@ -26,8 +26,7 @@ struct PathSums {
 /// Follows the paths of a picture. What it is made from must outlive it.
 class PathTracer {
  public:
-  PathTracer(const RenderVolume& volume, const Medium& medium, const Lights& lights, const Camera& camera,
-             const PathOptions& options);
+  PathTracer(const RenderScene& scene, const PathOptions& options);
   /// Traces the paths of a pixel and adds them to `sums`.
   void pixel(int x, int y, PathSums& sums) const;
 
@@ -71,6 +70,8 @@ class PathTracer {
   const Environment* skyMap_ = nullptr;
   Affine latticeToWorld_;
   const Camera& camera_;
+  Shutter shutter_;
+  const RigidMotion* motion_;
   const PathOptions& options_;
   MarchScene scene_;
   std::vector<Sun> suns_;

@@ -49,12 +49,13 @@ MarchScene withoutLight(MarchScene scene) {
 
 }  // namespace
 
-Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOptions& options, const Film& film)
+Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOptions& options,
+                 const Film& film)
     : lit_(lit),
-      camera_(camera),
-      shutter_(options.shutter),
-      motion_(options.volumeMotion),
-      blurred_(camera.hasLens() || camera.isMoving() || motion_),
+      camera_(scene.camera),
+      shutter_(scene.shutter),
+      motion_(scene.volumeMotion),
+      blurred_(scene.isBlurred()),
       pattern_(pixelPattern(options.samples, options.seed)),
       scene_(lit.scene) {
   scene_.step = options.step.value_or(lit.voxelSize);
@@ -64,21 +65,21 @@ Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOption
   // The rays of a pixel divide each other's steps, so that together they may take longer ones.
   scene_.stepDepth = options.samples == 1 ? 0.25f : 0.5f;
   scene_.leastStep = std::min(scene_.step, lit.voxelSize) / 8;
-  scene_.pixelAngle = float(camera.pixelAngle());
+  scene_.pixelAngle = float(camera_.pixelAngle());
   // The pixels of an orthographic picture are as wide everywhere.
-  if (camera.isOrthographic())
-    scene_.step = std::clamp(float(camera.pixelWidth(0)), scene_.step, 4 * scene_.step);
-  if (film.wantsPoints()) preparePoints(film, options);
+  if (camera_.isOrthographic())
+    scene_.step = std::clamp(float(camera_.pixelWidth(0)), scene_.step, 4 * scene_.step);
+  if (film.wantsPoints()) preparePoints(film, scene.nextCamera);
   isDeep_ = options.deep.has_value();
-  holdout_ = options.holdout.get();
+  holdout_ = scene.holdout;
   // What deep pictures and holdouts cut is measured by steps, whatever is seen of them.
   if (isDeep_ || holdout_) scene_.mostGrowth = 1, scene_.uniformStep = scene_.step;
-  surfaces_ = options.surfaces.get();
-  if (!blurred_) bounds_.emplace(*lit.source, camera);
+  surfaces_ = scene.surfaces;
+  if (!blurred_) bounds_.emplace(*lit.source, camera_);
   if ((field_ = lit.source->field())) {
     fieldSteps_.longest = options.step.value_or(0.25f * lit.voxelSize);
     fieldSteps_.pixelAngle = scene_.pixelAngle;
-    if (camera.isOrthographic()) fieldSteps_.pixelWidth = float(camera.pixelWidth(0));
+    if (camera_.isOrthographic()) fieldSteps_.pixelWidth = float(camera_.pixelWidth(0));
     fieldSteps_.threshold = options.refinement.threshold;
     fieldSteps_.halvings = options.refinement.halvings;
     // What is lost between two places where the light is read is as the square of their distance.
@@ -95,12 +96,12 @@ Picture::Picture(const BakedLight& lit, const Camera& camera, const RenderOption
   gains_.isGrey = scene_.colours == 1;
 }
 
-void Picture::preparePoints(const Film& film, const RenderOptions& options) {
+void Picture::preparePoints(const Film& film, const Camera* nextCamera) {
   pointScene_ = withoutLight(scene_);
   pointScene_.stepDepth = 0.25f;
   middle_ = camera_.stillAt(0.5);
   if (film.wantsNormals()) normals_.emplace(*lit_.source);
-  if (film.wantsPositions()) pixelMotion_.emplace(camera_, shutter_, motion_, options.nextCamera);
+  if (film.wantsPositions()) pixelMotion_.emplace(camera_, shutter_, motion_, nextCamera);
 }
 
 bool Picture::centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const {

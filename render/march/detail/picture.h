@@ -10,7 +10,7 @@
 #include "nephele/render/march/film.h"
 #include "nephele/render/march/march_kernels.h"
 #include "nephele/render/march/pixel_points.h"
-#include "nephele/render/march/raymarch.h"
+#include "nephele/render/march/render_scene.h"
 #include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/sub_samples.h"
 #include "nephele/render/volume/depth_bounds.h"
@@ -40,7 +40,7 @@ class Picture {
   };
 
   /// Keeps references to all of them.
-  Picture(const BakedLight& lit, const Camera& camera, const RenderOptions& options, const Film& film);
+  Picture(const BakedLight& lit, const RenderScene& scene, const RenderOptions& options, const Film& film);
 
   /// Pixels of a row that are best marched at a time.
   int pixelsTogether() const;
@@ -54,7 +54,7 @@ class Picture {
   void points(const PixelBox& box, Scratch& scratch) const;
 
  private:
-  void preparePoints(const Film& film, const RenderOptions& options);
+  void preparePoints(const Film& film, const Camera* nextCamera);
   bool centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const;
   Ray worldRay(int x, int y, const SubSample& sub) const;
   bool meet(const Ray& world, double cosine, bool isInside, MarchRay& ray,
@@ -73,7 +73,8 @@ class Picture {
   const BakedLight& lit_;
   const Camera& camera_;
   Shutter shutter_;
-  std::optional<RigidMotion> motion_;
+  // Null where the volume stands still.
+  const RigidMotion* motion_;
   bool blurred_;
   std::vector<SubSample> pattern_;
   // None for rays that are spread over a lens or over time.

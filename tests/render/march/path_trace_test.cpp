@@ -7,6 +7,7 @@
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/march/raymarch.h"
 #include "tests/support/density.h"
 #include "tests/support/test_data.h"
 
