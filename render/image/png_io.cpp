@@ -47,7 +47,7 @@ struct Handle {
 void requireWholeHeader(const std::string& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const auto size = std::int64_t(file.tellg());
-  for (std::int64_t at = 8; at + 12 <= size;) {
+  for (std::int64_t at = 8; at + 8 <= size;) {
     std::array<unsigned char, 8> head{};
     file.seekg(at);
     file.read(reinterpret_cast<char*>(head.data()), head.size());
