@@ -82,7 +82,7 @@ struct TreeValues {
 
 /// Trees of bricks and of voxels; constants become tiles. The transform is set, name and class are not.
 /// Of voxels handed over, samples are given back while leaves are made of them.
-/// @throws Error naming the grid if a value is not finite.
+/// `name` as messages show it. @throws Error naming the grid if a value is not finite.
 openvdb::FloatGrid::Ptr toOpenVdb(const BrickGrid& bricks, const TreeValues& values, const std::string& name);
 openvdb::FloatGrid::Ptr toOpenVdb(VoxelGrid<float>&& voxels, const TreeValues& values,
                                   const std::string& name);

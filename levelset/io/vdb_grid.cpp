@@ -46,7 +46,7 @@ float signOf(const openvdb::GridBase& grid) {
 
 detail::TreeValues fogValues(float background, const std::string& name) {
   require(background == 0.0f, fmt::format("grid {}: a fog volume must be 0 outside, but its background is {}",
-                                          name.empty() ? "without a name" : "'" + name + "'", background));
+                                          detail::displayName(name), background));
   return detail::TreeValues::fog();
 }
 
@@ -135,7 +135,7 @@ VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label) {
       label.gridClass == VdbGridInfo::Class::levelSet    ? detail::TreeValues::levelSet(bricks, label.name)
       : label.gridClass == VdbGridInfo::Class::fogVolume ? fogValues(bricks.background(), label.name)
                                                          : detail::TreeValues::asTheyAre(bricks.background());
-  return labelled(detail::toOpenVdb(bricks, values, label.name), label);
+  return labelled(detail::toOpenVdb(bricks, values, detail::displayName(label.name)), label);
 }
 
 VdbGrid toVdb(VoxelGrid<float> voxels, const VdbGridLabel& label) {
@@ -144,11 +144,11 @@ VdbGrid toVdb(VoxelGrid<float> voxels, const VdbGridLabel& label) {
       label.gridClass == VdbGridInfo::Class::levelSet    ? detail::TreeValues::levelSet(voxels, label.name)
       : label.gridClass == VdbGridInfo::Class::fogVolume ? fogValues(background, label.name)
                                                          : detail::TreeValues::asTheyAre(background);
-  return labelled(detail::toOpenVdb(std::move(voxels), values, label.name), label);
+  return labelled(detail::toOpenVdb(std::move(voxels), values, detail::displayName(label.name)), label);
 }
 
 VdbGrid toVdb(VoxelGrid<Vec3f> voxels, const VdbGridLabel& label) {
-  return labelled(detail::toOpenVdb(std::move(voxels), label.name), label);
+  return labelled(detail::toOpenVdb(std::move(voxels), detail::displayName(label.name)), label);
 }
 
 VdbGridLabel labelOf(const VdbGrid& grid) {

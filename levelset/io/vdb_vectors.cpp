@@ -51,7 +51,7 @@ std::array<VdbGrid, 3> vectorComponents(const VdbGrid& handle) {
   const openvdb::GridBase::Ptr& grid = handle.impl().grid;
   if (grid->isType<openvdb::Vec3SGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
   if (grid->isType<openvdb::Vec3DGrid>()) return components(*openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid));
-  throw Error(fmt::format("grid '{}' holds {} values; a grid of vectors is needed", grid->getName(),
+  throw Error(fmt::format("grid {} holds {} values; a grid of vectors is needed", detail::displayName(*grid),
                           grid->valueType()));
 }
 
@@ -94,8 +94,8 @@ VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label) {
 VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& handle) {
   const openvdb::GridBase& grid = *handle.impl().grid;
   require(grid.isType<openvdb::Vec3SGrid>(),
-          fmt::format("grid '{}' holds {} values; a grid of vectors of float is needed", grid.getName(),
-                      grid.valueType()));
+          fmt::format("grid {} holds {} values; a grid of vectors of float is needed",
+                      detail::displayName(grid), grid.valueType()));
   return detail::voxelsOf(static_cast<const openvdb::Vec3SGrid&>(grid));
 }
 
