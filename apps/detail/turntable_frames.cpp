@@ -123,9 +123,7 @@ class FrameWriter {
 };
 
 std::map<std::string, std::string> metadataOf(const PictureOptions& picture, const Run& run, int frame) {
-  auto metadata = run.metadata();
-  metadata["seed"] = std::to_string(picture.render.seed);
-  metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
+  auto metadata = picture.metadata(run);
   metadata["frame"] = std::to_string(frame);
   return metadata;
 }
@@ -144,6 +142,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   }
   double marchSeconds = 0;
   std::uint64_t rays = 0, samples = 0;
+  std::size_t notFinite = 0;
   FrameWriter writer(picture.screen);
   std::optional<FrameMaker> maker;
   if (!missing.empty()) maker.emplace(picture, volume, turntable, start, run);
@@ -159,6 +158,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
         addBackdrop(result.image, camera, turntable.lights(picture.lights, frame.number));
       // Also where a frame has no work that would ask.
       run.check();
+      notFinite += noteNotFinite(frame.path, result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
       metadata[TurntablePlan::kDigestName] = plan.digest;
       writer.write(frame, std::move(result.image), camera, std::move(metadata));
@@ -175,6 +175,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       throw;
     }
   run.count("frames", double(missing.size()));
+  run.stats["values_not_finite"] = notFinite;
   run.stats["rays"] = rays;
   run.stats["samples"] = samples;
   run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "apps/options/colour_options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/light/deep_shadow.h"
 
@@ -240,6 +241,8 @@ void addSky(CLI::App& app, LightOptions& options) {
       ->type_name("NUMBER")
       ->check(CLI::Range(0.0, 1e6))
       ->default_str("1");
+  addColourEncoding(app, "--sky-encoding", options.sky.encoding,
+                    "How the numbers of the map stand for light; auto: as the file says.");
 }
 
 void requireLight(const std::string& option, const std::string& name, bool known, const Lights& lights) {

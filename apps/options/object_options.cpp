@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
+#include "apps/options/colour_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"
-#include "nephele/render/image/texture_image.h"
 
 namespace nephele::apps {
 namespace {
@@ -47,6 +47,8 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
                  "Picture (.png, .exr) on the texture coordinates of objects; times their colour.")
       ->type_name("FILE")
       ->needs(object);
+  addColourEncoding(app, "--texture-encoding", options.textureEncoding,
+                    "How its numbers stand for light; auto: as the file says.");
   app.add_flag("--backdrop", options.backdrop,
                "A sky behind the preview, as the layer backdrop: that of --sky FILE, or a gradient.");
   CLI::Option* ground = app.add_flag("--ground", options.ground,
@@ -64,7 +66,8 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
 std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, double mostBytes) const {
   std::vector<SurfaceObject> all;
   const auto image =
-      texture.empty() ? nullptr : std::make_shared<const Image>(readTexture(texture, mostBytes));
+      texture.empty() ? nullptr
+                      : std::make_shared<const Image>(readLinearImage(texture, textureEncoding, mostBytes));
   for (const std::string& path : objects) {
     SurfaceObject object{readObject(path), colour, checkers, image};
     if ((checkers > 0 || image) && !hasCoordinates(object.mesh))

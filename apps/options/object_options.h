@@ -7,6 +7,7 @@
 
 #include "apps/app.h"
 #include "apps/options/render_options.h"
+#include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/surfaces.h"
 #include "nephele/render/volume/render_volume.h"
 
@@ -18,6 +19,7 @@ struct ObjectOptions {
   Vec3f colour{0.5f, 0.5f, 0.5f};
   int checkers = 0;
   std::string texture;
+  ColourEncoding textureEncoding = ColourEncoding::automatic;
   bool ground = false, backdrop = false;
   /// Height of the ground; the bottom of the volume if not given.
   std::optional<double> groundHeight;

@@ -158,4 +158,19 @@ RenderResult PictureOptions::picture(const RenderVolume& volume, const Camera& c
   return renderImage(volume, medium, lights, camera, marched(camera), progress);
 }
 
+std::map<std::string, std::string> PictureOptions::metadata(const Run& run) const {
+  auto metadata = run.metadata();
+  metadata["seed"] = std::to_string(render.seed);
+  metadata["extinction"] = fmt::format("{:g}", *extinction);
+  return metadata;
+}
+
+std::size_t noteNotFinite(const std::string& path, const Image& image, const Run& run) {
+  const std::size_t count = notFiniteCount(image);
+  if (count > 0)
+    run.note(fmt::format("{}: {} value{} of the picture {} not finite; 16 bit channels get 0 or 65504 there",
+                         path, count, count == 1 ? "" : "s", count == 1 ? "is" : "are"));
+  return count;
+}
+
 }  // namespace nephele::apps

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,7 +42,12 @@ struct PictureOptions : CameraOptions {
   RenderOptions marched(const Camera& camera) const;
   /// Marches or path traces; `resolved` comes first.
   RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
+  /// What files say of a picture.
+  std::map<std::string, std::string> metadata(const Run& run) const;
 };
+
+/// Says so if the picture for `path` holds values that no file can; returns how many.
+std::size_t noteNotFinite(const std::string& path, const Image& image, const Run& run);
 
 /// Declares the options on `app`.
 void addPictureOptions(CLI::App& app, PictureOptions& options);

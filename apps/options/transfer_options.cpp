@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "apps/options/colour_options.h"
 #include "apps/options/mesh_options.h"
 
 namespace nephele::apps {
@@ -13,6 +14,8 @@ void addPictures(CLI::App& app, TransferArguments& a) {
   CLI::Option* texture =
       app.add_option("--texture", a.texture, "Picture (.png, .exr) on the reference's texture coordinates.")
           ->type_name("FILE");
+  addColourEncoding(app, "--texture-encoding", a.textureEncoding,
+                    "How its numbers stand for light; auto: as the file says.");
   CLI::Option* bake = addOutput(app, "--bake-texture", a.bakedTexture, {".png"},
                                 "Write this picture laid out for the object's own texture coordinates.")
                           ->needs(texture);

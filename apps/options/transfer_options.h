@@ -7,6 +7,7 @@
 #include "apps/app.h"
 #include "nephele/levelset/warp/mesh_warp.h"
 #include "nephele/levelset/warp/transfer_attributes.h"
+#include "nephele/render/image/exr_io.h"
 #include "nephele/render/preview/texture_bake.h"
 #include "nephele/render/preview/transfer_picture.h"
 
@@ -22,6 +23,7 @@ struct TransferArguments {
   int subdivide = 0;
   std::string warpFile, warpedMesh;
   std::string texture, bakedTexture, preview;
+  ColourEncoding textureEncoding = ColourEncoding::automatic;
   TextureBakeOptions bake;
   /// That of the reference's picture, unless given.
   bool bakeSizeGiven = false;

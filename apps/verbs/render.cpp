@@ -64,15 +64,14 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   RenderResult result = picture.picture(volume, camera, run);
   if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
   run.begin("write");
-  auto metadata = run.metadata();
-  metadata["seed"] = std::to_string(picture.render.seed);
-  metadata["extinction"] = fmt::format("{:g}", *picture.extinction);
+  const auto metadata = picture.metadata(run);
   if (result.deep)
     writeExrPair({options.output, options.deep}, result.image, *result.deep, camera, metadata);
   else
     writeExr(options.output, result.image, camera, metadata);
   if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
 
+  run.stats["values_not_finite"] = noteNotFinite(options.output, result.image, run);
   run.stats["rays"] = result.rays;
   run.stats["samples"] = result.samples;
   if (result.deep) run.stats["deep_samples"] = result.deep->sampleCount();

@@ -13,8 +13,8 @@
 #include "nephele/levelset/warp/warp_grid.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
+#include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
-#include "nephele/render/image/texture_image.h"
 #include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
@@ -69,10 +69,10 @@ void transfer(const TransferArguments& arguments, Run& run) {
   const Mesh reference = readShape(arguments.from, run);
   const Mesh object = subdividedAsAsked(readShape(arguments.to, run), arguments.subdivide, run);
   const TransferOptions options = arguments.chosen(reference, object, run);
-  const auto texture =
-      arguments.texture.empty()
-          ? nullptr
-          : std::make_shared<const Image>(readTexture(arguments.texture, run.memoryLimitBytes));
+  const auto texture = arguments.texture.empty()
+                           ? nullptr
+                           : std::make_shared<const Image>(readLinearImage(
+                                 arguments.texture, arguments.textureEncoding, run.memoryLimitBytes));
   const TextureBakeOptions bakeOptions = texture ? arguments.bakeOptions(*texture) : TextureBakeOptions{};
   requirePictureMemory(arguments, bakeOptions, run);
 

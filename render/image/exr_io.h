@@ -18,7 +18,8 @@ class OutputFile;
 /// Carries `chromaticities`, `worldToCamera` and `worldToNDC` of the camera (a Camera will do; for row
 /// vectors) and `metadata` as text attributes, the screen window for the picture's width at distance 1. The
 /// data window is the image's, in a display window of the whole picture's size (Image::display). 16 bit
-/// values beyond 65504 are clamped to it. Written beside `path` and renamed.
+/// values beyond 65504 are clamped to it, NaN among them becomes 0 (see notFiniteCount). Written beside
+/// `path` and renamed.
 /// @throws Error naming the path; no partial file stays.
 void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata = {});
@@ -36,6 +37,21 @@ std::optional<ImageCamera> readImageCamera(const std::string& path);
 /// cannot hold, nor more than `mostBytes`.
 /// @throws Error naming the path and what is wrong, also where only pixels are damaged.
 Image readImage(const std::string& path, double mostBytes = std::numeric_limits<double>::infinity());
+
+/// How the numbers of a picture file stand for light.
+enum class ColourEncoding {
+  /// As the file says: OpenEXR and Radiance hold light; in PNG the chunks iCCP, sRGB and gAMA count, in this
+  /// order, and a file without them, or with a profile that is not of curves, is on the sRGB curve, with 8
+  /// bits or 16.
+  automatic,
+  linear,
+  srgb
+};
+
+/// As readImage, with R, G, B (three of grey) in linear light; other channels stay as they are.
+/// @throws Error also where the file has no colours.
+Image readLinearImage(const std::string& path, ColourEncoding encoding = ColourEncoding::automatic,
+                      double mostBytes = std::numeric_limits<double>::infinity());
 
 /// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes.
 /// Reads every pixel. @throws Error as readImage does.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string_view>
@@ -51,6 +52,16 @@ void Image::check() const {
             fmt::format("image: the channel {} has {} values, but the size is {}x{}", channel.name,
                         channel.values.size(), width, height));
   }
+}
+
+std::size_t notFiniteCount(const Image& image) {
+  std::size_t count = 0;
+  for (const Image::Channel& channel : image.channels) {
+    const bool isDepth = channel.name == "Z" || channel.name.starts_with("Z_");
+    count += std::size_t(std::ranges::count_if(
+        channel.values, [&](float v) { return !std::isfinite(v) && !(isDepth && std::isinf(v)); }));
+  }
+  return count;
 }
 
 namespace {

@@ -51,6 +51,10 @@ struct Image {
   }
 };
 
+/// Values that no file can hold as what they are: NaN, and infinity but in depths ("Z", "Z_median", "Z_mean",
+/// where it says that nothing is there).
+std::size_t notFiniteCount(const Image& image);
+
 /// How linear light becomes a picture for the screen.
 ///
 /// x = 2^exposureStops * (rgb + (1 - A) background), per channel then  x <= s: x;  x > s: s + (1 - s)(1 -

@@ -44,9 +44,12 @@ void readFile(const std::string& path, const ImageReader& reader) {
 }  // namespace
 }  // namespace detail
 
-Image readImage(const std::string& path, double mostBytes) {
+namespace {
+
+Image readPixels(const std::string& path, double mostBytes, detail::ImageHeader& read) {
   Image image;
   detail::readFile(path, {[&](const detail::ImageHeader& header) {
+                            read = header;
                             const double bytes = double(header.width) * header.height *
                                                  double(header.channels.size() * sizeof(float));
                             if (bytes > mostBytes)
@@ -68,6 +71,49 @@ Image readImage(const std::string& path, double mostBytes) {
                               for (std::size_t c = 0; c != count; ++c)
                                 image.channels[c].values[first + x] = values[x * count + c];
                           }});
+  return image;
+}
+
+// Integers have few values, so that each is worked out once.
+void apply(const TransferCurve& curve, const std::string& type, std::vector<float>& values) {
+  const int most = type == "uint8" ? 255 : type == "uint16" ? 65535 : 0;
+  if (most == 0) {
+    for (float& value : values) value = curve(value);
+    return;
+  }
+  std::vector<float> light(std::size_t(most) + 1);
+  for (std::size_t i = 0; i != light.size(); ++i) light[i] = curve(float(i) / float(most));
+  for (float& value : values) value = light[std::size_t(std::lround(value * float(most)))];
+}
+
+}  // namespace
+
+Image readImage(const std::string& path, double mostBytes) {
+  detail::ImageHeader header;
+  return readPixels(path, mostBytes, header);
+}
+
+Image readLinearImage(const std::string& path, ColourEncoding encoding, double mostBytes) {
+  detail::ImageHeader header;
+  Image image = readPixels(path, mostBytes, header);
+  const bool isGrey = image.find("Y") && !image.find("R");
+  const std::string type = header.channels.front().type;
+  std::optional<std::array<TransferCurve, 3>> curves;
+  if (encoding == ColourEncoding::srgb) curves.emplace().fill(TransferCurve::srgb());
+  if (encoding == ColourEncoding::automatic) curves = header.curves;
+  std::array<std::vector<float>, 3> colours;
+  constexpr const char* kNames[] = {"R", "G", "B"};
+  for (std::size_t c = 0; c != 3; ++c) {
+    const Image::Channel* channel = image.find(isGrey ? "Y" : kNames[c]);
+    if (!channel) throw Error(fmt::format("{}: has no channel {}, nor Y", path, kNames[c]));
+    colours[c] = channel->values;
+    if (curves) apply((*curves)[c], type, colours[c]);
+  }
+  for (std::size_t c = 0; c != 3; ++c) {
+    if (isGrey) image.add(kNames[c]);
+    for (Image::Channel& channel : image.channels)
+      if (channel.name == kNames[c]) channel.values = std::move(colours[c]);
+  }
   return image;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "nephele/render/image/image.h"
+#include "nephele/render/image/transfer_curve.h"
 
 namespace nephele::detail {
 
@@ -22,6 +24,8 @@ struct ImageHeader {
   /// Where the pixels lie in the picture that is meant, if the format knows such a thing.
   std::optional<Image::Display> display;
   std::vector<Channel> channels;
+  /// From the numbers of red, green and blue (or of grey) to light; none where they are light.
+  std::optional<std::array<TransferCurve, 3>> curves{};
   /// Name and value, in the order of the file.
   std::vector<std::pair<std::string, std::string>> attributes;
 };

@@ -58,6 +58,22 @@ void requireWholeHeader(const std::string& path) {
   }
 }
 
+// What the file says of its numbers, the most exact first; sRGB where it says nothing.
+std::array<TransferCurve, 3> curvesOf(png_structp png, png_infop info) {
+  std::array<TransferCurve, 3> curves;
+  png_charp name = nullptr;
+  png_bytep profile = nullptr;
+  png_uint_32 size = 0;
+  int compression = 0, intent = 0;
+  double gamma = 0;
+  if (png_get_iCCP(png, info, &name, &compression, &profile, &size))
+    if (const auto described = TransferCurve::ofProfile({profile, size})) return *described;
+  curves.fill(TransferCurve::srgb());
+  if (!png_get_sRGB(png, info, &intent) && png_get_gAMA(png, info, &gamma) && gamma > 0)
+    curves.fill(TransferCurve::power(float(1 / gamma)));
+  return curves;
+}
+
 struct Writer : Handle {
   Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {}
   ~Writer() { png_destroy_write_struct(&png, &info); }
@@ -137,6 +153,7 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
     const int textCount = png_get_text(png.png, png.info, &texts, nullptr);
     for (int i = 0; i < textCount; ++i)
       header.attributes.emplace_back(texts[i].key, texts[i].text ? texts[i].text : "");
+    header.curves = curvesOf(png.png, png.info);
     reader.begin(header);
 
     const std::size_t rowBytes = png_get_rowbytes(png.png, png.info);

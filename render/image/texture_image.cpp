@@ -16,29 +16,11 @@ namespace nephele {
 
 namespace {
 
-float linearOf(float v) {
-  return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
-}
-
 double fraction(double x) {
   return x - std::floor(x);
 }
 
 }  // namespace
-
-Image readTexture(const std::string& path, double mostBytes) {
-  Image image = readImage(path, mostBytes);
-  if (const Image::Channel* grey = image.find("Y"); grey && !image.find("R")) {
-    const std::vector<float> values = grey->values;
-    for (const char* name : {"R", "G", "B"}) image.add(name).values = values;
-  }
-  for (const char* name : {"R", "G", "B"})
-    if (!image.find(name)) throw Error(fmt::format("{}: has no channel {}, which textures need", path, name));
-  if (path.ends_with(".png"))
-    for (Image::Channel& channel : image.channels)
-      for (float& v : channel.values) v = linearOf(v);
-  return image;
-}
 
 Texture::Texture(const Image& image) {
   image.check();

@@ -1,17 +1,10 @@
 #pragma once
 
-#include <limits>
-#include <string>
 #include <vector>
 
 #include "nephele/render/image/image.h"
 
 namespace nephele {
-
-/// Reads a picture for a surface: R, G, B in linear light. The numbers of .png files are on the sRGB curve;
-/// grey ones become three channels. @throws Error naming the path if it cannot be read, has no colours or
-/// needs more than `mostBytes`.
-Image readTexture(const std::string& path, double mostBytes = std::numeric_limits<double>::infinity());
 
 /// A picture that repeats over the plane of texture coordinates, with copies of it, each of half the size,
 /// for what is seen from afar. Row 0 is at v = 1. Linear light in and out.

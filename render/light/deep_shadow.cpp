@@ -30,6 +30,8 @@ namespace {
 constexpr double kDeepest = 80;
 constexpr double kWidestDegrees = 75;
 constexpr int kMostPixels = 8192;
+// Of crisp clouds, as a mean.
+constexpr double kSamplesPerPixel = 30;
 
 // Density at an index-space position, as the marcher interpolates.
 double densityAt(const BrickGrid& grid, const Vec3d& p) {
@@ -133,10 +135,8 @@ Vec3d transformed(const Mat44& m, const Vec3d& p, double& w) {
   return result;
 }
 
-}  // namespace
-
-DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const DistantLight& light, float extinction,
-                             const Options& options, const Progress& progress) {
+// The camera of a light's picture.
+Camera cameraOf(const RenderVolume& volume, const DistantLight& light) {
   require(isFinite(light.direction) && length(light.direction) > 0,
           light.name + ": the direction towards it must be finite and not zero");
   const double voxel = double(volume.density().voxelSize());
@@ -155,11 +155,10 @@ DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const DistantLight& lig
   frame.projection = Camera::Projection::orthographic;
   frame.orthographicWidth = float(across);
   const Vec3d position = right * middle.x + up * middle.y + way * (low.z - 2 * voxel);
-  make(volume, Camera::facing(position, right, up, frame), extinction, options, progress);
+  return Camera::facing(position, right, up, frame);
 }
 
-DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const LocalLight& light, float extinction,
-                             const Options& options, const Progress& progress) {
+Camera cameraOf(const RenderVolume& volume, const LocalLight& light) {
   const double voxel = double(volume.density().voxelSize());
   const std::vector<Vec3d> points = outlineOf(volume);
   Vec3d low{INFINITY, INFINITY, INFINITY}, high = -low;
@@ -186,7 +185,34 @@ DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const LocalLight& light
   const int pixels = pixelCount(2 * tangent * 0.75 * farthest / voxel);
   Camera::Frame frame{pixels, pixels};
   frame.fovDegrees = float(2 * widest);
-  make(volume, Camera::facing(from, right, up, frame), extinction, options, progress);
+  return Camera::facing(from, right, up, frame);
+}
+
+// Lists grow by halves, and every sample ends in some two knots.
+double bytesOf(const Camera& camera) {
+  constexpr double perSample = 1.5 * sizeof(DeepSample) + 2 * sizeof(HoldoutCurve::Knot);
+  return double(camera.width()) * camera.height() *
+         (sizeof(std::vector<DeepSample>) + sizeof(std::size_t) + kSamplesPerPixel * perSample);
+}
+
+}  // namespace
+
+DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const DistantLight& light, float extinction,
+                             const Options& options, const Progress& progress) {
+  make(volume, cameraOf(volume, light), extinction, options, progress);
+}
+
+DeepShadowMap::DeepShadowMap(const RenderVolume& volume, const LocalLight& light, float extinction,
+                             const Options& options, const Progress& progress) {
+  make(volume, cameraOf(volume, light), extinction, options, progress);
+}
+
+double DeepShadowMap::estimateBytes(const RenderVolume& volume, const DistantLight& light) {
+  return bytesOf(cameraOf(volume, light));
+}
+
+double DeepShadowMap::estimateBytes(const RenderVolume& volume, const LocalLight& light) {
+  return bytesOf(cameraOf(volume, light));
 }
 
 void DeepShadowMap::make(const RenderVolume& volume, const Camera& camera, float extinction,
@@ -260,6 +286,12 @@ DeepShadowMap DeepShadowMap::read(const std::string& path, double mostBytes) {
 void DeepShadowMap::write(const std::string& path, const std::map<std::string, std::string>& metadata) const {
   require(image_ != nullptr, path + ": a deep shadow map that was read is not written again");
   writeDeepExr(path, *image_, camera_, metadata);
+}
+
+std::size_t DeepShadowMap::memoryBytes() const {
+  std::size_t bytes = curves_->memoryBytes();
+  if (image_) bytes += image_->pixels.size() * sizeof(image_->pixels[0]) + sampleCount() * sizeof(DeepSample);
+  return bytes;
 }
 
 float DeepShadowMap::depthAt(int x, int y, float depth) const {

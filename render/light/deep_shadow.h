@@ -38,6 +38,11 @@ class DeepShadowMap {
   /// @throws Error naming the path; also if the map was itself read.
   void write(const std::string& path, const std::map<std::string, std::string>& metadata = {}) const;
 
+  /// What making one holds, at most; it depends on how much a pixel of it meets, here 30 samples as a mean.
+  static double estimateBytes(const RenderVolume& volume, const DistantLight& light);
+  static double estimateBytes(const RenderVolume& volume, const LocalLight& light);
+  std::size_t memoryBytes() const;
+
   /// Between the light and a world-space point; 0 outside of the picture.
   float opticalDepth(const Vec3f& world) const;
   /// Knots of all pixels.

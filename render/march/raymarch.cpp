@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/light/deep_shadow.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/light/projected_light_volume.h"
 #include "nephele/render/light/scattered_light.h"
@@ -28,6 +29,20 @@ float defaultExtinction(const RenderVolume& volume) {
   return side > 0 ? 150.0f / (side * std::max(volume.typicalDensity(), 1.0f)) : 1.0f;
 }
 
+// Maps that were read stay; the others are made one after the other.
+static double deepShadowBytes(const RenderVolume& volume, const Lights& lights) {
+  double read = 0, made = 0;
+  const auto look = [&](const auto& light) {
+    if (light.deepShadow)
+      read += double(light.deepShadow->memoryBytes());
+    else if (lights.deepTolerance && !volume.isEmpty())
+      made = std::max(made, DeepShadowMap::estimateBytes(volume, light));
+  };
+  for (const DistantLight& sun : lights.suns) look(sun);
+  for (const LocalLight& light : lights.locals) look(light);
+  return read + made;
+}
+
 double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, const Camera& camera,
                            const RenderOptions& options) {
   double floats = double(Film::channelCount(options.aovs, lights.names().size()));
@@ -44,7 +59,7 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
                  double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume));
   const double finer =
       perNode > 1 ? perNode * double(volume.occupiedBricks().size()) * BrickGrid::kVolume * sizeof(float) : 0;
-  return others + shadows + finer + scattered.working +
+  return others + shadows + deepShadowBytes(volume, lights) + finer + scattered.working +
          3.0 * double(lights.names().size() + std::size_t(spots) + volume.hasEmission()) * scattered.kept +
          double(camera.window().width()) * camera.window().height() * floats * sizeof(float);
 }

@@ -82,16 +82,11 @@ Environment::Environment(int width, int height, std::vector<Vec3f> radiance, con
 }
 
 Environment Environment::read(const std::string& path, const Options& options, double mostBytes) {
-  const Image image = readImage(path, mostBytes);
-  const bool grey = !image.find("R") && image.find("Y");
-  const Image::Channel* channels[3];
-  for (int c = 0; c != 3; ++c) {
-    channels[c] = image.find(grey ? "Y" : c == 0 ? "R" : c == 1 ? "G" : "B");
-    require(channels[c], fmt::format("{}: expected the channels R, G, B, or Y, for a sky", path));
-  }
-  std::vector<Vec3f> radiance(channels[0]->values.size());
-  for (std::size_t i = 0; i != radiance.size(); ++i)
-    radiance[i] = {channels[0]->values[i], channels[1]->values[i], channels[2]->values[i]};
+  const Image image = readLinearImage(path, options.encoding, mostBytes);
+  const std::vector<float>&r = image.channel("R").values, &g = image.channel("G").values,
+        &b = image.channel("B").values;
+  std::vector<Vec3f> radiance(r.size());
+  for (std::size_t i = 0; i != radiance.size(); ++i) radiance[i] = {r[i], g[i], b[i]};
   try {
     return Environment(image.width, image.height, std::move(radiance), options);
   } catch (const Error& error) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/math.h"
+#include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/lights.h"
 
 namespace nephele {
@@ -21,6 +22,8 @@ class Environment {
     float rotationDegrees = 0;
     /// Multiplies the radiance, 0 to 1e6.
     float intensity = 1;
+    /// Of a file's numbers.
+    ColourEncoding encoding = ColourEncoding::automatic;
   };
 
   /// `radiance`: rows from the top. @throws Error if the size is not that of such a map, or a number is

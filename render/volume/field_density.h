@@ -28,7 +28,7 @@ class FieldDensity {
   /// Cost: ranges of the field over all cells that are neither empty nor constant, some microseconds each on
   /// all cores, and 1 kB per brick of 8^3 of them. The result does not depend on the number of threads.
   /// @throws Error if the box is empty or unbounded, `cell` (the edge of a cell, world units) is not above 0,
-  /// or more than 2^26 bricks were needed; Cancelled.
+  /// or more than 2^24 bricks were needed; Cancelled.
   FieldDensity(const ScalarField& density, const Box& box, float cell, const Progress& progress = silent());
 
   const Box& box() const { return box_; }

@@ -9,6 +9,7 @@
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/camera.h"
 #include "tests/support/density.h"
+#include "tests/support/png_bytes.h"
 #include "tests/support/run_program.h"
 
 namespace nephele::test {
@@ -118,6 +119,20 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
     EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.options << ": " << result.errors;
     EXPECT_FALSE(std::filesystem::exists(data_->file("bad.exr")));
   }
+}
+
+// A grey of 128 of 255 is 0.216 of the light on the curve of sRGB and 0.502 of it as it stands: times 2.325.
+TEST_F(LightOptions, SkiesFromPngAreOnTheCurveOfTheirFileOrOnTheOneThatIsSaid) {
+  PngPicture picture{.width = 2};
+  picture.rows = std::string(7, '\x80');
+  picture.rows[0] = '\0';
+  std::ofstream(data_->file("sky.PNG"), std::ios::binary) << picture.with("");
+  const std::string sky = "--sun none --sky " + file("sky.PNG");
+  const float curved = this->picture(sky).at("G", 8, 6);
+  EXPECT_GT(curved, 0.01f);
+  EXPECT_EQ(this->picture(sky + " --sky-encoding srgb").at("G", 8, 6), curved);
+  const double linear = double(this->picture(sky + " --sky-encoding linear").at("G", 8, 6));
+  EXPECT_NEAR(linear, 2.325 * double(curved), 0.01 * linear);
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ TEST_F(RenderVerb, WritesAPictureAPreviewAndStatistics) {
   const auto stats = nlohmann::json::parse(textOf(folder.file("s.json")));
   EXPECT_EQ(stats["rays"], 64 * 48 * 4);
   EXPECT_GT(stats["samples"], 1000);
+  EXPECT_EQ(stats["values_not_finite"], 0);
   EXPECT_GE(stats["light_seconds"], 0.0);
   EXPECT_GE(stats["march_seconds"], 0.0);
   // 150 / longest side, whose box is the ball's and a voxel around it.

@@ -68,7 +68,9 @@ void usePicture(const Input& input) {
   if (!succeeds(input.path, [&] { image = readImage(input.path, kMostBytes); })) return;
   image.check();
   if (image.width > 1024 || image.height > 1024 || image.channels.size() > 64) return;
-  succeeds(input.path, [&] { Texture(readTexture(input.path, kMostBytes)).at(0.3, 0.7, 2.5); });
+  succeeds(input.path, [&] {
+    Texture(readLinearImage(input.path, ColourEncoding::automatic, kMostBytes)).at(0.3, 0.7, 2.5);
+  });
   succeeds(input.path, [&] {
     Environment sky = Environment::read(input.path, {}, kMostBytes);
     sky.radiance({0, 1, 0});

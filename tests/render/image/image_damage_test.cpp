@@ -14,11 +14,14 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
+#include "tests/support/png_bytes.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
 namespace {
 
+using test::bigEndian;
+using test::checksum;
 using test::TemporaryFolder;
 using test::textOf;
 
@@ -49,22 +52,6 @@ Image smallImage() {
   for (const char* name : {"R", "G", "B", "A"})
     for (std::size_t i = 0; float& value : image.add(name).values) value = float(i++) / 20;
   return image;
-}
-
-std::uint32_t checksum(std::string_view bytes) {
-  // CRC-32 of the PNG specification, annex D, bit by bit.
-  std::uint32_t crc = ~0u;
-  for (const char byte : bytes) {
-    crc ^= std::uint8_t(byte);
-    for (int bit = 0; bit != 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xedb88320u : crc >> 1;
-  }
-  return ~crc;
-}
-
-std::string bigEndian(std::uint32_t value) {
-  std::string bytes;
-  for (int shift = 24; shift >= 0; shift -= 8) bytes += char(value >> shift);
-  return bytes;
 }
 
 std::string pngHeader(std::uint32_t width, std::uint32_t height, bool interlaced) {

@@ -52,5 +52,18 @@ TEST(Image, NamesAChannelThatIsMissing) {
   EXPECT_THROW(displayed(image, {}), Error);
 }
 
+TEST(Image, CountsWhatNoFileCanHold) {
+  Image image;
+  image.width = image.height = 2;
+  image.add("R").values = {NAN, INFINITY, -INFINITY, 1};
+  EXPECT_EQ(notFiniteCount(image), 3u);
+  // An infinite depth says that nothing is there.
+  for (const char* name : {"Z", "Z_median"}) image.add(name, false).values = {INFINITY, INFINITY, 1, 2};
+  EXPECT_EQ(notFiniteCount(image), 3u);
+  image.channels.back().values[3] = NAN;
+  image.add("normal.X", false).values[0] = INFINITY;
+  EXPECT_EQ(notFiniteCount(image), 5u);
+}
+
 }  // namespace
 }  // namespace nephele

@@ -112,6 +112,23 @@ TEST(DeepShadow, TakesFewerSamplesWhereMoreErrorIsAllowed) {
   EXPECT_LT(2 * count(0.02f), count(0.0005f));
 }
 
+TEST(DeepShadow, IsEstimatedBeforeItIsMade) {
+  const RenderVolume volume(test::ball(1, 0.02f));
+  Lights lights{.suns = {DistantLight{}}};
+  const Camera camera = Camera::lookingAt({0, 0, 4}, {}, {0, 1, 0}, {8, 8, 40});
+  const double without = estimateRenderBytes(volume, lights, camera, {});
+  const DeepShadowMap map(volume, lights.suns[0], 4, {2e-3f});
+  const double estimate = DeepShadowMap::estimateBytes(volume, lights.suns[0]);
+  EXPECT_GE(estimate, double(map.memoryBytes()));
+  // A crisp cloud takes more than a ball, but not a hundred times as much.
+  EXPECT_LT(estimate, 100 * double(map.memoryBytes()));
+  lights.deepTolerance = 2e-3f;
+  EXPECT_EQ(estimateRenderBytes(volume, lights, camera, {}), without + estimate);
+  lights.deepTolerance.reset();
+  lights.suns[0].deepShadow = std::make_shared<const DeepShadowMap>(map);
+  EXPECT_EQ(estimateRenderBytes(volume, lights, camera, {}), without + double(map.memoryBytes()));
+}
+
 TEST(DeepShadow, GoesThroughAFile) {
   const RenderVolume volume(smallCloud());
   const auto path = std::filesystem::temp_directory_path() / "nephele_deep_shadow_test.exr";
