@@ -11,6 +11,7 @@
 #include <future>
 
 #include "apps/detail/turntable_plan.h"
+#include "apps/options/live_picture.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/contact_sheet.h"
 #include "nephele/render/image/exr_io.h"
@@ -130,8 +131,10 @@ std::map<std::string, std::string> metadataOf(const PictureOptions& picture, con
 
 }  // namespace
 
-void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
+void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& given,
                 const RenderVolume& volume, const Camera& start, Run& run) {
+  PictureOptions picture = given;
+  LivePicture live(picture.displayServer, options.output, picture.render);
   const Vec3f middle = volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
   const Turntable turntable(options.orbit, middle, plan.first, plan.last, options.turns);
   std::vector<TurntableFrame*> missing;
@@ -156,6 +159,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       RenderResult result = maker->make(frame.number, camera, progress);
       if (options.objects.backdrop)
         addBackdrop(result.image, camera, turntable.lights(picture.lights, frame.number));
+      live.complete(result.image);
       // Also where a frame has no work that would ask.
       run.check();
       notFinite += noteNotFinite(frame.path, result.image, run);
@@ -174,6 +178,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
                            i, missing.size()));
       throw;
     }
+  live.finish(run);
   run.count("frames", double(missing.size()));
   run.stats["values_not_finite"] = notFinite;
   run.stats["rays"] = rays;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/options/live_picture.h"
 #include "nephele/render/march/film.h"
 
 namespace nephele::apps {
@@ -119,6 +120,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       app, "--background", "R,G,B", 3, 0, kBrightest, [&options](const Vec3f& v) { options.background = v; },
       "Linear colour behind the preview.")
       ->default_str("the sky's");
+  addDisplayServer(app, options.displayServer);
 }
 
 PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostBytes) const {

@@ -9,6 +9,7 @@
 #include "apps/options/camera_options.h"
 #include "apps/options/light_options.h"
 #include "apps/options/volume_options.h"
+#include "nephele/render/image/display_server.h"
 #include "nephele/render/image/image.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"
@@ -33,6 +34,7 @@ struct PictureOptions : CameraOptions {
   bool pathTraced = false;
   PathOptions path;
   ViewTransform screen;
+  std::optional<DisplayServer::Options> displayServer;
   /// Behind the preview; the sky's radiance if not given.
   std::optional<Vec3f> background;
 

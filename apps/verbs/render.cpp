@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "apps/options/live_picture.h"
 #include "apps/options/object_options.h"
 #include "apps/options/render_options.h"
 #include "nephele/render/image/exr_io.h"
@@ -61,6 +62,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
       double(volume.memoryBytes()) + estimateRenderBytes(volume, picture.lights, camera, picture.render),
       "make the picture smaller (--size), or the volume with larger voxels");
   picture.light.writeShadows(volume, picture.lights, picture.medium, run);
+  LivePicture live(picture.displayServer, options.output, picture.render);
   RenderResult result = picture.picture(volume, camera, run);
   if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
   run.begin("write");
@@ -71,6 +73,8 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
     writeExr(options.output, result.image, camera, metadata);
   if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
 
+  live.complete(result.image);
+  live.finish(run);
   run.stats["values_not_finite"] = noteNotFinite(options.output, result.image, run);
   run.stats["rays"] = result.rays;
   run.stats["samples"] = result.samples;
