@@ -71,6 +71,7 @@ class FrameMaker {
     if (picture_.pathTraced) {
       PictureOptions picture = picture_;
       picture.lights = turntable_.lights(picture_.lights, frame);
+      if (picture_.shutter.isInstant()) picture.render.nextCamera = turntable_.camera(start_, frame + 1);
       return picture.picture(volume_, camera, progress);
     }
     if (turntable_.lightsMove()) {

@@ -88,8 +88,6 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
 
 void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const {
   picture.render.surfaces = surfaces(volume, mostBytes);
-  if (picture.pathTraced && picture.render.surfaces)
-    refuseValue("--integrator", "path", "march, where there are objects");
 }
 
 }  // namespace nephele::apps

@@ -27,7 +27,7 @@ struct ObjectOptions {
 
   /// Reads the files; null where there are no objects. @throws Error naming the file.
   std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, double mostBytes) const;
-  /// Puts them into `picture`. @throws Error as `surfaces`, CLI::Error if it is to be path traced.
+  /// Puts them into `picture`. @throws Error as `surfaces`.
   void addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const;
 };
 

@@ -150,13 +150,20 @@ RenderOptions PictureOptions::marched(const Camera& camera) const {
   return options;
 }
 
+PathOptions PictureOptions::traced() const {
+  PathOptions options = path;
+  static_cast<FrameOptions&>(options) = render;
+  return options;
+}
+
+double PictureOptions::estimateBytes(const RenderVolume& volume, const Camera& camera) const {
+  return estimateRenderBytes(volume, lights, camera, render) +
+         (pathTraced ? estimatePathBytes(camera, traced()) : 0);
+}
+
 RenderResult PictureOptions::picture(const RenderVolume& volume, const Camera& camera,
                                      const Progress& progress) const {
-  if (pathTraced) {
-    PathOptions options = path;
-    static_cast<FrameOptions&>(options) = render;
-    return pathTraceImage(volume, medium, lights, camera, options, progress);
-  }
+  if (pathTraced) return pathTraceImage(volume, medium, lights, camera, traced(), progress);
   return renderImage(volume, medium, lights, camera, marched(camera), progress);
 }
 

@@ -42,6 +42,10 @@ struct PictureOptions : CameraOptions {
   PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
   /// `render` with the rays per pixel that suit `camera`, unless they were given.
   RenderOptions marched(const Camera& camera) const;
+  /// `path`, with what both integrators have in common.
+  PathOptions traced() const;
+  /// That a picture will hold beside the volume, at most.
+  double estimateBytes(const RenderVolume& volume, const Camera& camera) const;
   /// Marches or path traces; `resolved` comes first.
   RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
   /// What files say of a picture.

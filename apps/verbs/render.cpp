@@ -40,9 +40,6 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
 // What there is beside the volume, and depth.
 void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, const Camera& camera,
                PictureOptions& picture, const Run& run) {
-  if (picture.pathTraced && !(options.deep.empty() && options.holdout.empty()))
-    refuseValue(options.deep.empty() ? "--holdout" : "--deep",
-                options.deep.empty() ? options.holdout : options.deep, "--integrator march");
   options.objects.addTo(picture, volume, run.memoryLimitBytes);
   if (!options.deep.empty()) picture.render.deep.emplace();
   if (!options.deep.empty() && picture.adaptiveThreshold > 0)
@@ -58,9 +55,8 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   const Camera camera = picture.camera(volume);
   addOthers(options, volume, camera, picture, run);
-  run.requireMemory(
-      double(volume.memoryBytes()) + estimateRenderBytes(volume, picture.lights, camera, picture.render),
-      "make the picture smaller (--size), or the volume with larger voxels");
+  run.requireMemory(double(volume.memoryBytes()) + picture.estimateBytes(volume, camera),
+                    "make the picture smaller (--size), or the volume with larger voxels");
   picture.light.writeShadows(volume, picture.lights, picture.medium, run);
   LivePicture live(picture.displayServer, options.output, picture.render);
   RenderResult result = picture.picture(volume, camera, run);

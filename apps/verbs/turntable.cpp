@@ -70,7 +70,7 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   const Camera start = firstCamera(options, picture, volume);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.
-  const double bytes = estimateRenderBytes(volume, picture.lights, start, picture.render);
+  const double bytes = picture.estimateBytes(volume, start);
   run.requireMemory(double(volume.memoryBytes()) + (options.orbit == Orbit::camera ? 1 : 2) * bytes,
                     "make the picture smaller (--size), or the volume with larger voxels");
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);

@@ -7,8 +7,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/march/detail/path_tracer.h"
@@ -40,23 +43,12 @@ class PathIntegrator final : public Integrator {
 
   bool prepare(const RenderScene& scene, const Film& film, const Progress& progress) override {
     require(film.options().adaptiveThreshold == 0, "adaptive threshold: path traced pixels are too noisy");
-    bool deep = scene.lights.deepTolerance.has_value();
-    for (const DistantLight& sun : scene.lights.suns) deep = deep || sun.deepShadow;
-    for (const LocalLight& light : scene.lights.locals) deep = deep || light.deepShadow;
-    require(!deep, "path tracing: deep shadow maps can only be marched");
-    require(!scene.surfaces, "path tracing: objects can only be marched");
-    require(!scene.holdout, "path tracing: holdouts can only be marched");
-    require(!film.options().deep, "path tracing: deep pictures can only be marched");
-    require(!scene.volume.field(),
-            "path tracing: needs a density that is a grid; fieldVolume makes one of a field");
     if (!isSeen(scene.volume, scene.medium)) return false;
-    progress_ = &progress;
-    tracer_.emplace(scene, options_);
+    tracer_.emplace(scene, options_, film.options().deep.has_value(), progress);
     if (film.wantsDepth() || film.wantsPoints()) {
       unlit_.emplace(scene.volume, scene.medium, Lights{}, sightOptions_.octaves, nullptr, progress, nullptr);
       sight_.emplace(*unlit_, scene, sightOptions_, film);
     }
-    albedo_ = scene.medium.albedo;
     return true;
   }
 
@@ -65,17 +57,20 @@ class PathIntegrator final : public Integrator {
  private:
   class Worker final : public TileWorker {
    public:
-    explicit Worker(const PathIntegrator& of) : of_(of), scratch_(of.sightOptions_) {}
+    explicit Worker(const PathIntegrator& of)
+        : of_(of), scratch_(of.sightOptions_), deep_(of.options_.deep.value_or(DeepOptions{})) {}
 
     void integrate(const PixelBox& tile, Film& film) override {
+      const std::size_t perPixel = std::size_t(of_.options_.samplesPerPixel);
+      of_.tracer_->trace(tile, wave_, sums_);
+      samples += std::exchange(wave_.scatterings, 0);
+      rays += perPixel * sums_.size();
+      detail::PathSums* sums = sums_.data();
       for (int y = tile.y0; y != tile.y1; ++y)
-        for (int x = tile.x0; x != tile.x1; ++x) {
-          of_.progress_->check();
-          detail::PathSums sums;
-          of_.tracer_->pixel(x, y, sums);
-          samples += sums.scatterings;
-          rays += std::uint64_t(of_.options_.samplesPerPixel);
-          film.set(film.placeOf(x, y), sumOf(sums, film.wantsDepth() ? depthAt(x, y) : INFINITY));
+        for (int x = tile.x0; x != tile.x1; ++x, ++sums) {
+          const std::size_t place = film.placeOf(x, y);
+          film.set(place, sumOf(*sums, film.wantsDepth() ? depthAt(x, y) : INFINITY));
+          if (film.deep()) film.set(place, deep_.samples(sums->events, perPixel));
         }
     }
 
@@ -99,14 +94,17 @@ class PathIntegrator final : public Integrator {
       pixel.depth = depth;
       pixel.alpha = float((sums.opacity.x + sums.opacity.y + sums.opacity.z) / 3 * share);
       pixel.opacity = Vec3f(sums.opacity * share);
-      pixel.albedo = pixel.opacity * of_.albedo_;
+      pixel.albedo = Vec3f(sums.albedo * share);
       pixel.emission = Vec3f(sums.emission * share);
       for (std::size_t i = 0; i != sums.light.size(); ++i) pixel.light[i] = Vec3f(sums.light[i] * share);
       return pixel;
     }
 
     const PathIntegrator& of_;
+    detail::PathTracer::Wave wave_;
+    std::vector<detail::PathSums> sums_;
     detail::Picture::Scratch scratch_;
+    detail::DeepPixel deep_;
   };
 
   PathOptions options_;
@@ -115,11 +113,16 @@ class PathIntegrator final : public Integrator {
   std::optional<detail::BakedLight> unlit_;
   std::optional<detail::Picture> sight_;
   std::optional<detail::PathTracer> tracer_;
-  const Progress* progress_ = nullptr;
-  Vec3f albedo_{};
 };
 
 }  // namespace
+
+double estimatePathBytes(const Camera& camera, const PathOptions& options) {
+  if (!options.deep) return 0;
+  // Where opacity grows by the tolerance there may be a sample.
+  const double perPixel = std::min(double(options.samplesPerPixel), 2 / double(options.deep->tolerance));
+  return perPixel * sizeof(DeepSample) * camera.window().width() * camera.window().height();
+}
 
 std::unique_ptr<Integrator> pathIntegrator(const PathOptions& options) {
   return std::make_unique<PathIntegrator>(options);

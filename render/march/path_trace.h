@@ -23,6 +23,12 @@ struct PathOptions : FrameOptions {
   /// Paths firstSample .. firstSample + samplesPerPixel - 1 of every pixel are traced, so that a picture can
   /// go on where another one of the same seed ended: the picture of N paths is the mean of the first N.
   std::uint64_t firstSample = 0;
+  /// Whether light that objects scatter goes on, into the volume and to each other, and they stand in the way
+  /// of all light. If not, they are what the marcher makes of them, for comparison: they are lit by what
+  /// comes straight from suns, points, spots and the sky through the volume, cast shadows of all these but
+  /// the sky into it, and scatter nothing into it. Where paths may scatter once only, both differ by the sky
+  /// alone.
+  bool objectsScatter = true;
 };
 
 /// The same picture as renderImage with all scattering, without bias and with noise: what the marcher and its
@@ -36,6 +42,10 @@ struct PathOptions : FrameOptions {
 RenderResult pathTraceImage(const RenderVolume& volume, const Medium& medium, const Lights& lights,
                             const Camera& camera, const PathOptions& options = {},
                             const Progress& progress = silent());
+
+/// Bytes that the samples of a deep picture may hold: as many as there are paths, but for what the tolerance
+/// puts together. 0 for flat ones.
+double estimatePathBytes(const Camera& camera, const PathOptions& options);
 
 /// What follows the paths of such a picture, for nephele::render. @throws Error if an option is outside its
 /// range.

@@ -194,7 +194,11 @@ std::optional<Surfaces::Hit> Surfaces::hit(const Ray& ray) const {
     return dot(smooth, flat) > 0.766f ? smooth : flat;
   };
   result.normal = normalize(cornerNormal(0) * a + cornerNormal(1) * b + cornerNormal(2) * c);
-  if (dot(Vec3d(flat), ray.direction) > 0) result.normal = -result.normal;
+  result.faceNormal = flat;
+  if (dot(Vec3d(flat), ray.direction) > 0) {
+    result.normal = -result.normal;
+    result.faceNormal = -flat;
+  }
   result.isHoldout = object.isHoldout;
   result.colour = object.colour;
   if (object.checkers == 0 && !object.texture) return result;

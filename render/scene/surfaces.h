@@ -42,8 +42,8 @@ class Surfaces {
 
   struct Hit {
     double distance = 0.0;
-    /// Unit, smooth, on the side of the surface that the ray comes from.
-    Vec3f normal{};
+    /// Unit, smooth, on the side of the surface that the ray comes from; and that of the triangle itself.
+    Vec3f normal{}, faceNormal{};
     Vec3f colour{};
     bool isHoldout = false;
   };

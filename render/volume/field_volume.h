@@ -43,7 +43,8 @@ RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const
 /// Only the light is worked out on a grid, whose voxels of `voxelSize` (world units) hold the mean of 8
 /// places in each: shadows are as soft as that. Where nothing else is known, `fieldVoxelSize` for some 2
 /// pixels per voxel is a good choice. Pictures, deep ones and layers come from the field, normals and what
-/// falls on objects from the grid; the path tracer and combined volumes take grids only. Cost: 8 evaluations
+/// falls on marched objects from the grid; paths see nothing but the field. Combined volumes take grids only.
+/// Cost: 8 evaluations
 /// per voxel and ranges of the voxels wherever the density varies.
 /// @throws Error as FieldDensity and bakeGrid do, or if the grid finds nothing of a field that may not be
 /// empty; Cancelled.

@@ -111,7 +111,6 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
       {"--sky " + file("broken.hdr"), "broken.hdr: is damaged: 0 bytes cannot hold 4 x 2 pixels", 1},
       {"--read-deep-shadow " + file("map.exr"), "map.exr: is not a deep image", 1},
       {"--point 0.1,0,0,1 --shadows deep", "choose shadows from a volume", 1},
-      {"--shadows deep --integrator path", "deep shadow maps can only be marched", 1},
   };
   for (const auto& c : cases) {
     const ProgramResult result = render(c.options, "bad.exr");

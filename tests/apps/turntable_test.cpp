@@ -135,8 +135,8 @@ TEST_F(TurntableVerb, ObjectsStandBesideTheVolumeInEveryOrbit) {
   const Image turned = readImage(folder.file("r.exr")), second = readImage(frame(2));
   for (std::size_t i = 0; i != turned.channel("R").values.size(); ++i)
     ASSERT_NEAR(second.channel("R").values[i], turned.channel("R").values[i], 2e-3f);
-  const ProgramResult refused = runProgram(call("--frames 1-2 --integrator path --ground"));
-  EXPECT_EQ(refused.exitCode, 2) << refused.errors;
+  const ProgramResult traced = runProgram(call("--frames 1-2 --integrator path --spp 1 --ground"));
+  EXPECT_EQ(traced.exitCode, 0) << traced.errors;
 }
 
 TEST_F(TurntableVerb, MakesDeepShadowMapsAnewForLightsThatTurn) {

@@ -19,6 +19,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/march/path_trace.h"
+#include "nephele/render/march/raymarch.h"
 
 namespace nephele {
 namespace {

@@ -141,6 +141,41 @@ bool DeepPixel::fits(std::size_t first, std::size_t last) const {
 
 std::vector<DeepSample> DeepPixel::samples() {
   merge();
+  return cut();
+}
+
+std::vector<DeepSample> DeepPixel::samples(std::vector<Event>& events, std::size_t pathCount) {
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.depth < b.depth; });
+  mean_.clear();
+  const double share = 1.0 / double(pathCount);
+  double opacity = 0;
+  Vec3d colour;
+  Knot last;
+  for (std::size_t i = 0; i != events.size();) {
+    const std::size_t first = i;
+    const float depth = events[i].depth;
+    for (; i != events.size() && events[i].depth == depth; ++i) {
+      opacity += double(events[i].opacity);
+      colour += Vec3d(events[i].colour);
+    }
+    const Knot next{depth, float(opacity * share), Vec3f(colour * share)};
+    // A jump where several paths met it, and where there is nothing in front.
+    if (const bool isJump = first == 0 || i - first > 1; isJump) {
+      if (first == 0 || depth > last.z) mean_.push_back({depth, last.opacity, last.colour});
+      last = next;
+      last.z = std::nextafter(depth, INFINITY);
+    } else {
+      last = next;
+    }
+    if (!mean_.empty() && last.z <= mean_.back().z) last.z = std::nextafter(mean_.back().z, INFINITY);
+    mean_.push_back(last);
+  }
+  return cut();
+}
+
+// Samples as long as they can be.
+std::vector<DeepSample> DeepPixel::cut() {
   std::vector<DeepSample> result;
   if (mean_.size() < 2) return result;
   brightness_ = most(mean_.back().colour);

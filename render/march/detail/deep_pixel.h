@@ -35,6 +35,15 @@ class DeepPixel {
   /// Samples whose numbers are 16 bit floats, rounded so that the errors of a pixel do not add up.
   std::vector<DeepSample> samples();
 
+  /// Something that one of many paths met at a depth, with what is seen of it.
+  struct Event {
+    float depth = 0.0f, opacity = 0.0f;
+    Vec3f colour{};
+  };
+  /// The samples of a pixel that is the mean of `pathCount` paths; sorts their events by depth. Between
+  /// depths at which single paths met something opacity grows evenly.
+  std::vector<DeepSample> samples(std::vector<Event>& events, std::size_t pathCount);
+
  private:
   struct Knot {
     float z = 0.0f, opacity = 0.0f;
@@ -42,6 +51,7 @@ class DeepPixel {
   };
 
   void merge();
+  std::vector<DeepSample> cut();
   bool fits(std::size_t first, std::size_t last) const;
 
   DeepOptions options_;

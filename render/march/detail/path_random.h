@@ -9,6 +9,7 @@ namespace nephele::detail {
 /// paths change a path.
 class PathRandom {
  public:
+  PathRandom() = default;
   PathRandom(std::uint64_t seed, std::uint64_t pixel, std::uint64_t path)
       : state_(mixed(mixed(mixed(seed) + pixel) + path)) {}
 
@@ -16,6 +17,12 @@ class PathRandom {
   float next() { return float(bits() >> 40) * 0x1p-24f; }
   /// Exponential with mean 1.
   float depth() { return -std::log(1.0f - next()); }
+  /// Numbers of their own, for work that is done at another time.
+  PathRandom fork() {
+    PathRandom other;
+    other.state_ = mixed(bits());
+    return other;
+  }
 
  private:
   // The finaliser of SplitMix64 (Steele, Lea, Flood 2014), a bijection.
@@ -31,7 +38,7 @@ class PathRandom {
     return value;
   }
 
-  std::uint64_t state_;
+  std::uint64_t state_ = 0;
 };
 
 }  // namespace nephele::detail

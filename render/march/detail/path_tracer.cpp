@@ -1,18 +1,14 @@
-// The reference: light transport in a volume by random paths, unbiased.
+// The reference: light transport by random paths through a volume and between objects, unbiased.
 //
-// Free paths: delta tracking (Woodcock 1965). In every brick the extinction is at most extinction * largest
-// density of the brick; tentative collisions are drawn for that bound, and each is real with the share that
-// the density there has of it. Bricks without density are skipped as the marcher skips them. Sunlight: at
-// each scattering towards every sun, its transmittance by ratio tracking (Novak, Selle, Jarosz 2014): the
-// same walk, whose tentative collisions multiply by the share that is not real, ended by Russian roulette
-// where little is left. So for points and spots, up to where they are. Sky: what a path sees where it leaves
-// the volume after scattering; a sky from a map also by a direction drawn from its luminance at every
-// scattering, the two weighed by their densities (the balance heuristic of Veach, 1997). Colour: a path
-// carries a weight per channel that every scattering multiplies by the albedo, and every tentative collision
-// by how much likelier it is to that colour where extinctions differ.
+// A path goes from the camera to its first collision or to an object, and on from there in a direction drawn
+// from the phase function, or evenly by cosines. At each meeting it looks at every sun, point and spot
+// through the volume. Sky: what a path sees where it leaves; a sky from a map also by a direction drawn from
+// its luminance at every meeting, the two weighed by their densities (the balance heuristic of Veach, 1997).
+// Colour: a path carries a weight per channel that every meeting multiplies by the albedo.
 //
-// Random numbers are a hash of seed, pixel, path and count, so that neither threads nor the number of paths
-// change a path. Points within a pixel follow the R2 sequence of M. Roberts, shifted at random for each
+// Many paths go on together, from meeting to meeting, so that a field can be asked for many densities at a
+// time. Random numbers are a hash of seed, pixel, path and count, so that neither threads nor the number of
+// paths change a path. Points within a pixel follow the R2 sequence of M. Roberts, shifted at random for each
 // pixel, through the marcher's tent filter.
 #include "nephele/render/march/detail/path_tracer.h"
 
@@ -20,19 +16,20 @@
 #include <cmath>
 #include <limits>
 
-#include "nephele/levelset/grid/brick_box.h"
-#include "nephele/levelset/grid/brick_grid.h"
-#include "nephele/render/volume/brick_walk.h"
-#include "nephele/render/volume/trilinear.h"
+#include "nephele/render/light/deep_shadow.h"
 
 namespace nephele::detail {
 
 namespace {
 
-// Below these shares of light, transmittances and paths play Russian roulette.
-constexpr float kLeastTransmittance = 0.1f;
+// Below this share of light, paths play Russian roulette.
 constexpr float kLeastWeight = 0.2f;
-constexpr float kInfinite = std::numeric_limits<float>::infinity();
+// Objects that a path may meet before it goes on by chance only: inside a closed one it would never end.
+constexpr int kReflections = 64;
+constexpr float kGoesOn = 0.9f;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+// Paths that go on together: as many as the cache holds, or as make long blocks of points.
+constexpr std::size_t kGridPaths = 64, kFieldPaths = 2048;
 
 double fraction(double x) {
   return x - std::floor(x);
@@ -44,7 +41,7 @@ double tent(double u) {
 }
 
 // `axis` turned by an angle of cosine `cosine` towards the side that `turn`, in [0, 1), chooses.
-Vec3f scattered(const Vec3f& axis, float cosine, float turn) {
+Vec3f turned(const Vec3f& axis, float cosine, float turn) {
   // A vector across the axis, from whichever two components are far from zero.
   const Vec3f across =
       std::fabs(axis.x) > 0.7f ? normalize(Vec3f{-axis.y, axis.x, 0}) : normalize(Vec3f{0, -axis.z, axis.y});
@@ -53,285 +50,296 @@ Vec3f scattered(const Vec3f& axis, float cosine, float turn) {
                    cross(axis, across) * (sine * std::sin(angle)));
 }
 
+Vec3f mirrored(const Vec3f& way, const Vec3f& normal) {
+  return way - normal * (2 * dot(way, normal));
+}
+
 float largest(const Vec3f& v) {
   return std::max({v.x, v.y, v.z});
 }
 
 }  // namespace
 
-PathTracer::PathTracer(const RenderScene& scene, const PathOptions& options)
-    : medium_(scene.medium),
-      lights_(scene.lights),
-      camera_(scene.camera),
-      shutter_(scene.shutter),
-      motion_(scene.volumeMotion),
-      options_(options) {
-  const RenderVolume& volume = scene.volume;
-  const Medium& medium = scene.medium;
+PathTracer::PathTracer(const RenderScene& scene, const PathOptions& options, bool isDeep,
+                       const Progress& progress)
+    : scene_(scene),
+      options_(options),
+      progress_(progress),
+      surfaces_(scene.surfaces),
+      isDeep_(isDeep),
+      volume_(scene.volume, scene.medium),
+      skyMap_(scene.lights.map.get()) {
   const Lights& lights = scene.lights;
-  // The extinction is that of the most opaque colour.
-  medium_.extinction *= largest(medium.extinctionColour);
-  colour_ = medium.extinctionColour / largest(medium.extinctionColour);
-  perEmission_ = medium.extinction;
-  const BrickGrid& grid = volume.density();
-  scene_.density = {grid.values().data(), grid.table().data(), grid.brickCount()};
-  scene_.ranges = grid.ranges().data();
-  scene_.emptiness = volume.emptiness().data();
-  if (volume.hasColour()) {
-    const VolumeColour::Grids& colours = volume.colour().scattering;
-    for (std::size_t c = 0; c != 3; ++c) scene_.colour.values[c] = colours[c]->values().data();
-    scene_.colour.table = colours[0]->table().data();
-    scene_.colour.count = colours[0]->brickCount();
-  }
-  if (volume.hasEmission()) {
-    const VolumeColour::Grids& glow = volume.colour().emission;
-    for (std::size_t c = 0; c != 3; ++c) scene_.emission.values[c] = glow[c]->values().data();
-    scene_.emission.table = glow[0]->table().data();
-    scene_.emission.count = glow[0]->brickCount();
-    leastBound_ = 1 / (BrickGrid::kBrick * grid.voxelSize());
-  }
-  isColoured_ = volume.hasEmission() || colour_ != Vec3f{1, 1, 1};
-  map_ = grid.worldToIndex();
-  leastStep_ = 1e-4f * grid.voxelSize();
-  const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
-  shift_ = Vec3d(map_.translation) - Vec3d(corner);
-  bounds_ = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
-  for (const DistantLight& sun : lights.suns) {
-    const Vec3f towards = normalize(sun.direction);
-    suns_.push_back({towards, map_.linear * towards, sun.irradiance, sun.shadow * colour_});
-  }
-  latticeToWorld_ = {grid.indexToWorld().linear, grid.indexToWorld()(corner)};
-  hasSky_ = lights.hasSky();
-  skyMap_ = lights.map.get();
-  blurred_ = scene.isBlurred();
+  const auto mapOf = [&](const auto& light) {
+    std::shared_ptr<const DeepShadowMap> map = light.deepShadow;
+    if (!map && lights.deepTolerance)
+      map = std::make_shared<const DeepShadowMap>(scene.volume, light, volume_.extinction(),
+                                                  DeepShadowMap::Options{*lights.deepTolerance}, progress);
+    return map;
+  };
+  for (const DistantLight& sun : lights.suns)
+    suns_.push_back({normalize(Vec3d(sun.direction)), sun.irradiance, sun.shadow, mapOf(sun)});
+  for (const LocalLight& light : lights.locals) localMaps_.push_back(mapOf(light));
+  skyLayer_ = suns_.size() + lights.locals.size();
+  layers_ = scene.lightNames().size();
 }
 
-void PathTracer::pixel(int x, int y, PathSums& sums) const {
-  const std::uint64_t index = std::uint64_t(y) * std::uint64_t(camera_.width()) + std::uint64_t(x);
-  sums.light.resize(suns_.size() + lights_.locals.size() + 1);
+void PathTracer::start(int x, int y, std::uint64_t number, Path& path) const {
+  const Camera& camera = scene_.camera;
+  const std::uint64_t index = std::uint64_t(y) * std::uint64_t(camera.width()) + std::uint64_t(x);
   PathRandom offset(options_.seed, index, ~std::uint64_t(0));
-  const double u = double(offset.next()), v = double(offset.next());
-  for (int i = 0; i != options_.samplesPerPixel; ++i) {
-    const std::uint64_t path = options_.firstSample + std::uint64_t(i);
-    const double number = double(path + 1);
-    PathRandom random(options_.seed, index, path);
-    const double px = x + 0.5 + tent(fraction(u + 0.7548776662466927 * number)),
-                 py = y + 0.5 + tent(fraction(v + 0.5698402909980532 * number));
-    trace(blurred_ ? blurredRay(px, py, random) : camera_.ray(px, py), random, sums);
+  const double u = double(offset.next()), v = double(offset.next()), place = double(number + 1);
+  path = {};
+  path.random = PathRandom(options_.seed, index, number);
+  const double px = x + 0.5 + tent(fraction(u + 0.7548776662466927 * place)),
+               py = y + 0.5 + tent(fraction(v + 0.5698402909980532 * place));
+  if (scene_.isBlurred()) {
+    const double lensU = double(path.random.next()), lensV = double(path.random.next()),
+                 time = double(path.random.next());
+    path.ray = camera.ray(px, py, lensU, lensV, time);
+    path.frames = scene_.shutter.open + time * (scene_.shutter.close - scene_.shutter.open);
+    path.foreground.cosine = dot(path.ray.direction, camera.forwardAt(time));
+  } else {
+    path.ray = camera.ray(px, py);
+    path.foreground.cosine = dot(path.ray.direction, camera.forward());
+  }
+  if (scene_.holdout) path.foreground.holdout = scene_.holdout->at(x, y);
+}
+
+void PathTracer::trace(const PixelBox& tile, Wave& wave, std::vector<PathSums>& sums) const {
+  const std::size_t perPixel = std::size_t(options_.samplesPerPixel), width = std::size_t(tile.width()),
+                    count = width * std::size_t(tile.height()) * perPixel,
+                    together = volume_.isField() ? kFieldPaths : kGridPaths;
+  sums.assign(width * std::size_t(tile.height()), {});
+  for (PathSums& sum : sums) sum.light.resize(layers_);
+  for (std::size_t begin = 0; begin < count; begin += together) {
+    progress_.check();
+    const std::size_t end = std::min(begin + together, count);
+    wave.paths.resize(end - begin);
+    wave.light.assign(wave.paths.size() * layers_, {});
+    for (std::size_t i = begin; i != end; ++i) {
+      Path& path = wave.paths[i - begin];
+      const std::size_t pixel = i / perPixel;
+      start(tile.x0 + int(pixel % width), tile.y0 + int(pixel / width), options_.firstSample + i % perPixel,
+            path);
+      path.pixel = std::uint32_t(pixel);
+      if (isDeep_) path.foreground.glow = &sums[pixel].events;
+    }
+    follow(wave);
+    finish(wave, sums);
   }
 }
 
-template <class BoundOf, class Meet>
-void PathTracer::collide(const LatticeRay& ray, float length, PathRandom& random, BoundOf&& boundOf,
-                         Meet&& meet) const {
-  float depth = random.depth();
-  detail::walkBricks(scene_, ray, length, [&](float s, float end, std::int32_t pool) {
-    const float bound = boundOf(pool);
-    for (;;) {
-      const float step = std::fmax(depth / bound, leastStep_);
-      if (!(s + step < end)) {
-        depth = std::fmax(0.0f, depth - (end - s) * bound);
-        return true;
-      }
-      s += step;
-      if (!meet(s, bound, pool)) return false;
-      depth = random.depth();
-    }
-  });
-}
-
-float PathTracer::freePath(const LatticeRay& ray, PathRandom& random) const {
-  float hit = kInfinite;
-  collide(
-      ray, kInfinite, random, [&](std::int32_t pool) { return medium_.extinction * scene_.ranges[pool].max; },
-      [&](float s, float, std::int32_t pool) {
-        if (!(random.next() * scene_.ranges[pool].max < density(ray.origin + ray.direction * s))) return true;
-        hit = s;
-        return false;
-      });
-  return hit;
-}
-
-float PathTracer::freePath(const LatticeRay& ray, Vec3f& weight, Vec3d& glow, PathRandom& random) const {
-  if (!isColoured_) return freePath(ray, random);
-  float hit = kInfinite;
-  collide(
-      ray, kInfinite, random,
-      [&](std::int32_t pool) { return std::fmax(medium_.extinction * scene_.ranges[pool].max, leastBound_); },
-      [&](float s, float bound, std::int32_t) {
-        const Vec3f p = ray.origin + ray.direction * s;
-        if (scene_.emission.table)
-          for (int c = 0; c != 3; ++c)
-            glow[c] +=
-                double(weight[c] * perEmission_ / bound) *
-                double(valueAt({scene_.emission.values[c], scene_.emission.table, scene_.emission.count}, p));
-        const Vec3f real = colour_ * std::fmin(medium_.extinction * density(p) / bound, 1.0f);
-        const float sum = weight.x + weight.y + weight.z;
-        if (!(sum > 0)) return false;
-        const float chance = dot(weight, real) / sum;
-        if (random.next() < chance) {
-          weight = weight * real / chance;
-          hit = s;
-          return false;
-        }
-        weight = weight * (Vec3f{1, 1, 1} - real) / (1 - chance);
-        return true;
-      });
-  return hit;
-}
-
-Vec3f PathTracer::transmittance(const LatticeRay& ray, float length, const Vec3f& shadow,
-                                PathRandom& random) const {
-  const float red = transmittance(ray, length, shadow.x, random);
-  if (shadow.x == shadow.y && shadow.x == shadow.z) return {red, red, red};
-  const float green = transmittance(ray, length, shadow.y, random);
-  return {red, green, transmittance(ray, length, shadow.z, random)};
-}
-
-float PathTracer::transmittance(const LatticeRay& ray, float length, float shadow, PathRandom& random) const {
-  float through = 1.0f;
-  collide(
-      ray, length, random,
-      [&](std::int32_t pool) { return medium_.extinction * shadow * scene_.ranges[pool].max; },
-      [&](float s, float, std::int32_t pool) {
-        const float there = density(ray.origin + ray.direction * s);
-        through *= std::fmax(0.0f, 1.0f - there / scene_.ranges[pool].max);
-        if (through >= kLeastTransmittance) return true;
-        if (random.next() * kLeastTransmittance >= through) {
-          through = 0.0f;
-          return false;
-        }
-        through = kLeastTransmittance;
-        return true;
-      });
-  return through;
-}
-
-float PathTracer::density(const Vec3f& p) const {
-  return valueAt(scene_.density, p);
-}
-
-Vec3f PathTracer::colour(const Vec3f& p) const {
-  if (!scene_.colour.table) return {1, 1, 1};
-  const float there = density(p);
-  Vec3f result;
-  for (int c = 0; c != 3 && there > 0; ++c)
-    result[c] = valueAt({scene_.colour.values[c], scene_.colour.table, scene_.colour.count}, p) / there;
-  return result;
-}
-
-float PathTracer::valueAt(const MarchScene::Bricks& bricks, const Vec3f& p) {
-  Vec3i brick;
-  Vec3f local;
-  for (int axis = 0; axis != 3; ++axis) {
-    brick[axis] = std::clamp(int(p[axis] * 0.125f), 0, bricks.count[axis] - 1);
-    local[axis] = std::clamp(p[axis] - 8.0f * float(brick[axis]), 0.0f, 7.9999995f);
+// Lets all paths go on from meeting to meeting until they end.
+void PathTracer::follow(Wave& wave) const {
+  wave.live.resize(wave.paths.size());
+  for (std::size_t i = 0; i != wave.live.size(); ++i) wave.live[i] = std::uint32_t(i);
+  while (!wave.live.empty()) {
+    wave.hits.resize(wave.live.size());
+    wave.flights.resize(wave.live.size());
+    for (std::size_t i = 0; i != wave.live.size(); ++i)
+      prepareFlight(wave.paths[wave.live[i]], wave.hits[i], wave.flights[i]);
+    volume_.fly(wave.flights, wave.volume);
+    wave.ways.clear();
+    wave.looks.clear();
+    std::size_t next = 0;
+    for (std::size_t i = 0; i != wave.live.size(); ++i)
+      if (arrive(wave.live[i], wave.flights[i], wave.hits[i], wave)) wave.live[next++] = wave.live[i];
+    wave.live.resize(next);
+    volume_.look(wave.ways, wave.volume);
+    for (std::size_t i = 0; i != wave.looks.size(); ++i)
+      add(wave.looks[i].path, wave.looks[i].light, wave.looks[i].radiance * wave.ways[i].left, wave);
   }
-  const Vec3i cell(local);
-  const float* samples =
-      bricks.values +
-      std::size_t(bricks.table[BrickBox{{}, bricks.count}.numberOf(brick)]) * std::size_t(BrickGrid::kVolume);
-  return std::fmax(0.0f, trilinear(samples + sampleOffset(cell.x, cell.y, cell.z), local - Vec3f(cell),
-                                   BrickGrid::kWidth, BrickGrid::kWidth * BrickGrid::kWidth));
 }
 
-Ray PathTracer::blurredRay(double x, double y, PathRandom& random) const {
-  const double u = double(random.next()), v = double(random.next()), time = double(random.next());
-  const Ray ray = camera_.ray(x, y, u, v, time);
-  return motion_ ? motion_->toBody(ray, shutter_.open + time * (shutter_.close - shutter_.open)) : ray;
+Ray PathTracer::inVolume(const Path& path, const Ray& ray) const {
+  return path.isInWorld && scene_.volumeMotion ? scene_.volumeMotion->toBody(ray, path.frames) : ray;
 }
 
-bool PathTracer::enter(const Ray& ray, LatticeRay& out) const {
-  Vec3d origin = shift_, direction{};
-  for (int row = 0; row != 3; ++row)
-    for (int column = 0; column != 3; ++column) {
-      const double m = double(map_.linear(row, column));
-      origin[row] += m * ray.origin[column];
-      direction[row] += m * ray.direction[column];
-    }
-  double first = 0, last = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis != 3; ++axis) {
-    const double low = double(bounds_.min[axis]) - origin[axis],
-                 high = double(bounds_.max[axis]) - origin[axis];
-    if (direction[axis] == 0) {
-      if (low > 0 || high < 0) return false;
-      continue;
-    }
-    const double a = low / direction[axis], b = high / direction[axis];
-    first = std::max(first, std::min(a, b));
-    last = std::min(last, std::max(a, b));
+void PathTracer::prepareFlight(Path& path, std::optional<Surfaces::Hit>& hit, Flight& flight) const {
+  hit.reset();
+  const bool isOfCamera = path.scatterings == 0;
+  if (surfaces_ && (isOfCamera || options_.objectsScatter)) hit = surfaces_->hit(path.ray);
+  flight = {inVolume(path, path.ray), hit ? hit->distance : kInfinite, path.random.fork()};
+  if (isOfCamera) flight.foreground = &path.foreground;
+  flight.weight = flight.arriving = path.weight;
+}
+
+// What becomes of a path at the end of a flight: whether it goes on.
+bool PathTracer::arrive(std::uint32_t index, Flight& flight, const std::optional<Surfaces::Hit>& hit,
+                        Wave& wave) const {
+  Path& path = wave.paths[index];
+  // Objects that scatter nothing into the volume see nothing of what it scatters or sends out either.
+  const bool seesSkyOnly = path.isFromSurface && !options_.objectsScatter;
+  path.weight = flight.weight;
+  if (path.scatterings == 0)
+    path.emission = flight.glow;
+  else if (path.isOfObject && !seesSkyOnly)
+    add(index, layers_ - 1, Vec3f(flight.glow), wave);
+  else if (!seesSkyOnly)
+    path.laterEmission += flight.glow * double(path.held);
+
+  const bool isMet = std::isfinite(flight.distance);
+  if (!isMet && !hit) {
+    if (path.scatterings > 0) leave(index, wave);
+    return false;
   }
-  out = {Vec3f(origin + direction * first), Vec3f(direction)};
-  return last > first;
+  if (seesSkyOnly || (path.scatterings > 0 && path.scatterings == options_.maxScatterings)) return false;
+  if (isMet) {
+    if (path.scatterings == 0 && !meetFirst(path, flight.arriving, flight.distance, nullptr)) return false;
+    path.isInWorld = false;
+    const Vec3d place = flight.ray.origin + flight.ray.direction * flight.distance;
+    path.weight = path.weight * volume_.albedoAt(place);
+    return scatter(index, {place, Vec3f(flight.ray.direction), {}, {}, false}, wave);
+  }
+  if (path.scatterings == 0 &&
+      (hit->isHoldout || !meetFirst(path, flight.arriving, hit->distance, &hit->colour)))
+    return false;
+  path.weight = path.weight * hit->colour;
+  ++path.reflections;
+  const Vec3d place =
+      path.ray.origin + path.ray.direction * hit->distance + Vec3d(hit->faceNormal) * surfaces_->clearance();
+  return scatter(index, {place, Vec3f(path.ray.direction), hit->normal, hit->faceNormal, true}, wave);
 }
 
-void PathTracer::trace(const Ray& camera, PathRandom& random, PathSums& sums) const {
-  LatticeRay ray;
-  if (!enter(camera, ray)) return;
-  Vec3f direction(camera.direction), weight{1, 1, 1};
-  float s = freePath(ray, weight, sums.emission, random);
-  if (s == kInfinite) {
-    sums.opacity += Vec3d{1, 1, 1} - Vec3d(weight);
+// Notes what the camera sees first; `objectColour` is null in the volume. False if none of it is seen.
+bool PathTracer::meetFirst(Path& path, const Vec3f& weight, double distance,
+                           const Vec3f* objectColour) const {
+  path.held = path.foreground.heldAt(distance);
+  const Vec3f opacity = weight * path.held;
+  path.event = {float(distance * path.foreground.cosine), (opacity.x + opacity.y + opacity.z) / 3, {}};
+  path.albedo = path.foreground.opacity * scene_.medium.albedo +
+                opacity * (objectColour ? *objectColour : scene_.medium.albedo);
+  path.foreground.opacity += opacity;
+  path.isOfObject = objectColour;
+  return path.held > 0;
+}
+
+bool PathTracer::survives(Path& path) const {
+  if (path.reflections > kReflections) {
+    if (path.random.next() >= kGoesOn) return false;
+    path.weight = path.weight / kGoesOn;
+  }
+  const float most = largest(path.weight);
+  if (most >= kLeastWeight) return true;
+  if (path.random.next() * kLeastWeight >= most) return false;
+  path.weight *= kLeastWeight / most;
+  return true;
+}
+
+// Looks at the lights from a meeting, and draws where the path goes on; false if it ends.
+bool PathTracer::scatter(std::uint32_t index, const Meeting& meeting, Wave& wave) const {
+  Path& path = wave.paths[index];
+  ++path.scatterings;
+  ++wave.scatterings;
+  if (!survives(path)) return false;
+  lookAtLights(index, meeting, wave);
+  if (path.scatterings == options_.maxScatterings && !scene_.lights.hasSky() && !volume_.glows())
+    return false;
+  const float first = path.random.next(), turn = path.random.next();
+  Vec3f direction;
+  if (meeting.isSurface) {
+    direction = turned(meeting.normal, std::sqrt(first), turn);
+    // What a smooth normal would send into the object goes out of its face.
+    if (dot(direction, meeting.faceNormal) < 0) direction = mirrored(direction, meeting.faceNormal);
+  } else {
+    direction = turned(meeting.incoming, scene_.medium.phase.sampleCosine(first, path.random.next()), turn);
+  }
+  path.chance = shareOf(meeting, direction);
+  path.isFromSurface = meeting.isSurface;
+  path.ray = {meeting.place, Vec3d(direction)};
+  return options_.objectsScatter || !meeting.isSurface || !surfaces_->occluded(path.ray, kInfinite);
+}
+
+// Per steradian, what of the light from a direction goes back along the path.
+float PathTracer::shareOf(const Meeting& meeting, const Vec3f& towards) const {
+  if (!meeting.isSurface) return scene_.medium.phase(dot(meeting.incoming, towards));
+  if (!(dot(towards, meeting.faceNormal) > 0)) return 0;
+  return (std::fmax(dot(towards, meeting.normal), 0.0f) +
+          std::fmax(dot(mirrored(towards, meeting.faceNormal), meeting.normal), 0.0f)) /
+         kPi;
+}
+
+void PathTracer::lookAtLights(std::uint32_t index, const Meeting& meeting, Wave& wave) const {
+  Path& path = wave.paths[index];
+  const auto look = [&](std::size_t light, const Ray& ray, double distance, const Vec3f& radiance,
+                        const Vec3f& extinction) {
+    wave.looks.push_back({index, light, radiance});
+    wave.ways.push_back({inVolume(path, ray), distance, path.random.fork(), extinction});
+  };
+  const auto lookAtLight = [&](std::size_t light, const Vec3d& towards, double distance, Vec3f radiance,
+                               const Vec3f& shadow, const DeepShadowMap* map) {
+    radiance = radiance * path.weight * shareOf(meeting, Vec3f(towards));
+    const Vec3f extinction = shadow * volume_.colour();
+    const Ray ray{meeting.place, towards};
+    if (radiance == Vec3f{}) return;
+    if (surfaces_ && surfaces_->occluded(ray, distance))
+      // A light whose shadow lets a colour through is not stopped by objects in the volume.
+      for (int c = 0; c != 3; ++c)
+        if (meeting.isSurface || extinction[c] > 0) radiance[c] = 0;
+    if (radiance == Vec3f{}) return;
+    if (!map || meeting.isSurface) return look(light, ray, distance, radiance, extinction);
+    const float depth = map->opticalDepth(Vec3f(meeting.place));
+    for (int c = 0; c != 3; ++c) radiance[c] *= std::exp(-depth * extinction[c]);
+    add(index, light, radiance, wave);
+  };
+  for (std::size_t i = 0; i != suns_.size(); ++i)
+    lookAtLight(i, suns_[i].towards, kInfinite, suns_[i].irradiance, suns_[i].shadow, suns_[i].map.get());
+  for (std::size_t i = 0; i != scene_.lights.locals.size(); ++i) {
+    const LocalLight& light = scene_.lights.locals[i];
+    const Vec3d way = Vec3d(light.position) - meeting.place;
+    const double distance = std::max(length(way), double(volume_.least()));
+    const Vec3d towards = way / distance;
+    lookAtLight(suns_.size() + i, towards, distance,
+                light.intensity * (light.decayAt(float(distance)) * light.coneAt(-Vec3f(towards))),
+                light.shadow, localMaps_[i].get());
+  }
+  if (!skyMap_) return;
+  const float a = path.random.next(), b = path.random.next(), c = path.random.next();
+  const Environment::Sample sky = skyMap_->sample(a, b, c, path.random.next());
+  const float share = shareOf(meeting, sky.towards);
+  if (!(sky.density > 0) || !(share > 0)) return;
+  const Ray ray{meeting.place, Vec3d(sky.towards)};
+  if (surfaces_ && (options_.objectsScatter ? surfaces_->hit(ray).has_value()
+                                            : meeting.isSurface && surfaces_->occluded(ray, kInfinite)))
     return;
-  }
-  sums.opacity += Vec3d{1, 1, 1};
-  for (int scattering = 1;; ++scattering) {
-    ++sums.scatterings;
-    ray.origin += ray.direction * s;
-    weight = weight * medium_.albedo * colour(ray.origin);
-    if (largest(weight) < kLeastWeight) {
-      if (random.next() * kLeastWeight >= largest(weight)) return;
-      weight *= kLeastWeight / largest(weight);
-    }
-    for (std::size_t i = 0; i != suns_.size(); ++i) {
-      const Sun& sun = suns_[i];
-      const float phase = medium_.phase(dot(direction, sun.towards));
-      const Vec3f through = transmittance({ray.origin, sun.lattice}, kInfinite, sun.shadow, random);
-      sums.light[i] += Vec3d(weight * sun.irradiance * through) * double(phase);
-    }
-    for (std::size_t i = 0; i != lights_.locals.size(); ++i)
-      sums.light[suns_.size() + i] += local(lights_.locals[i], ray.origin, direction, weight, random);
-    if (skyMap_) sums.light.back() += drawnSky(ray.origin, direction, weight, random);
-    const bool isLast = scattering == options_.maxScatterings;
-    if (isLast && !hasSky_ && !scene_.emission.table) return;
-    const float lobe = random.next(), turn = random.next();
-    const Vec3f before = direction;
-    direction = scattered(direction, medium_.phase.sampleCosine(lobe, random.next()), turn);
-    ray.direction = map_.linear * direction;
-    s = freePath(ray, weight, sums.emission, random);
-    if (s == kInfinite) {
-      if (!skyMap_) {
-        sums.light.back() += Vec3d(weight * lights_.sky);
-        return;
-      }
-      const float own = medium_.phase(dot(before, direction)), drawn = skyMap_->density(direction);
-      sums.light.back() += Vec3d(weight * skyMap_->radiance(direction)) * double(own / (own + drawn));
-      return;
-    }
-    if (isLast) return;
-  }
+  look(skyLayer_, ray, kInfinite,
+       path.weight * skyMap_->radiance(sky.towards) * (share / (sky.density + share)), volume_.colour());
 }
 
-Vec3d PathTracer::local(const LocalLight& light, const Vec3f& at, const Vec3f& direction, const Vec3f& weight,
-                        PathRandom& random) const {
-  const Vec3f way = light.position - latticeToWorld_(at);
-  const float distance = std::fmax(length(way), leastStep_);
-  const Vec3f towards = way / distance;
-  const float share =
-      medium_.phase(dot(direction, towards)) * light.decayAt(distance) * light.coneAt(-towards);
-  if (!(share > 0)) return {};
-  const Vec3f through = transmittance({at, map_.linear * towards}, distance, light.shadow * colour_, random);
-  return Vec3d(weight * light.intensity * through) * double(share);
+// The sky where a path leaves.
+void PathTracer::leave(std::uint32_t index, Wave& wave) const {
+  const Path& path = wave.paths[index];
+  if (!skyMap_) return add(index, skyLayer_, path.weight * scene_.lights.sky, wave);
+  const Vec3f direction(path.ray.direction);
+  const float drawn = skyMap_->density(direction);
+  add(index, skyLayer_, path.weight * skyMap_->radiance(direction) * (path.chance / (path.chance + drawn)),
+      wave);
 }
 
-Vec3d PathTracer::drawnSky(const Vec3f& at, const Vec3f& direction, const Vec3f& weight,
-                           PathRandom& random) const {
-  const float a = random.next(), b = random.next(), c = random.next();
-  const Environment::Sample sky = skyMap_->sample(a, b, c, random.next());
-  if (!(sky.density > 0)) return {};
-  const float phase = medium_.phase(dot(direction, sky.towards));
-  const Vec3f through = transmittance({at, map_.linear * sky.towards}, kInfinite, colour_, random);
-  return Vec3d(weight * through * skyMap_->radiance(sky.towards)) * double(phase / (sky.density + phase));
+void PathTracer::add(std::uint32_t index, std::size_t light, const Vec3f& radiance, Wave& wave) const {
+  const Path& path = wave.paths[index];
+  wave.light[index * layers_ + (path.isOfObject ? layers_ - 1 : light)] += Vec3d(radiance * path.held);
+}
+
+// In the order of the paths, so that no pixel depends on others.
+void PathTracer::finish(Wave& wave, std::vector<PathSums>& sums) const {
+  for (std::size_t i = 0; i != wave.paths.size(); ++i) {
+    Path& path = wave.paths[i];
+    PathSums& sum = sums[path.pixel];
+    const bool isMet = path.scatterings > 0;
+    sum.opacity += Vec3d(path.foreground.opacity);
+    sum.albedo += Vec3d(isMet ? path.albedo : path.foreground.opacity * scene_.medium.albedo);
+    sum.emission += path.emission + path.laterEmission;
+    Vec3d colour = path.laterEmission;
+    for (std::size_t light = 0; light != layers_; ++light) {
+      sum.light[light] += wave.light[i * layers_ + light];
+      colour += wave.light[i * layers_ + light];
+    }
+    if (!isDeep_ || !isMet) continue;
+    path.event.colour = Vec3f(colour);
+    sum.events.push_back(path.event);
+  }
 }
 
 }  // namespace nephele::detail

@@ -1,93 +1,126 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <vector>
 
-#include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/math.h"
+#include "nephele/modeling/base/progress.h"
 #include "nephele/render/march/detail/path_random.h"
+#include "nephele/render/march/detail/path_volume.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/scene/environment.h"
-#include "nephele/render/volume/lattice_ray.h"
-#include "nephele/render/volume/march_scene.h"
+#include "nephele/render/scene/surfaces.h"
 
 namespace nephele::detail {
 
 /// What the paths of one pixel add up to.
 struct PathSums {
-  std::uint64_t scatterings = 0;
-  /// Paths that meet anything; where colours differ in extinction, the share of each that does.
-  Vec3d opacity{};
+  /// Opacity that is seen, per colour, and the same times the albedo of what is met.
+  Vec3d opacity{}, albedo{};
   Vec3d emission{};
-  /// As Lights::names.
+  /// As RenderScene::lightNames.
   std::vector<Vec3d> light;
+  /// For deep pictures; no event means nothing is met.
+  std::vector<DeepPixel::Event> events;
 };
 
 /// Follows the paths of a picture. What it is made from must outlive it.
 class PathTracer {
  public:
-  PathTracer(const RenderScene& scene, const PathOptions& options);
-  /// Traces the paths of a pixel and adds them to `sums`.
-  void pixel(int x, int y, PathSums& sums) const;
+  PathTracer(const RenderScene& scene, const PathOptions& options, bool isDeep, const Progress& progress);
+
+  /// One path on its way.
+  struct Path {
+    PathRandom random;
+    /// From where it is. In the world, or, once the volume has scattered it, in the space of the volume.
+    Ray ray;
+    bool isInWorld = true;
+    /// When, in frames after the one of the picture.
+    double frames = 0.0;
+    Vec3f weight{1, 1, 1};
+    int scatterings = 0, reflections = 0;
+    /// Per steradian, how likely it was to go where it goes.
+    float chance = 0.0f;
+    bool isFromSurface = false;
+    std::uint32_t pixel = 0;
+    /// Of what it met first: what holdouts leave of it, and how much light glows in front of that and behind.
+    Foreground foreground{};
+    DeepPixel::Event event{};
+    float held = 1.0f;
+    Vec3f albedo{};
+    bool isOfObject = false;
+    Vec3d emission{}, laterEmission{};
+  };
+
+  /// Working memory of a thread.
+  class Wave {
+   public:
+    std::uint64_t scatterings = 0;
+
+   private:
+    friend class PathTracer;
+
+    struct Look {
+      std::uint32_t path;
+      std::size_t light;
+      Vec3f radiance;
+    };
+    PathVolume::Scratch volume;
+    std::vector<Path> paths;
+    std::vector<std::uint32_t> live;
+    std::vector<std::optional<Surfaces::Hit>> hits;
+    std::vector<Flight> flights;
+    std::vector<ShadowWay> ways;
+    // What each of the ways is for.
+    std::vector<Look> looks;
+    // Of every path in turn, as PathSums::light.
+    std::vector<Vec3d> light;
+  };
+
+  /// Traces the paths of the pixels of a tile, row by row, into as many `sums`.
+  void trace(const PixelBox& tile, Wave& wave, std::vector<PathSums>& sums) const;
 
  private:
   struct Sun {
-    Vec3f towards, lattice, irradiance, shadow;
+    Vec3d towards;
+    Vec3f irradiance, shadow;
+    std::shared_ptr<const DeepShadowMap> map;
+  };
+  // Where a path meets anything, and how it scatters there.
+  struct Meeting {
+    Vec3d place;
+    Vec3f incoming;
+    // Of a surface; the second one that of the face itself.
+    Vec3f normal, faceNormal;
+    bool isSurface;
   };
 
-  // Tentative collisions along `length` of a ray, by delta tracking: calls meet(s, bound, pool) at each
-  // until it returns false; boundOf(pool) is an extinction that none in the brick exceeds.
-  template <class BoundOf, class Meet>
-  void collide(const LatticeRay& ray, float length, PathRandom& random, BoundOf&& boundOf, Meet&& meet) const;
-  // Distance to the next collision from the origin of `ray`; infinite if it leaves the volume.
-  float freePath(const LatticeRay& ray, PathRandom& random) const;
-  // The same where colours differ in extinction or something glows. A tentative collision is real by a chance
-  // that lies between those of the colours, by their weights, and each weight makes up for it (spectral
-  // tracking, Kutz, Habel, Li and Novak 2017); at each one the path sees what glows there per extinction.
-  float freePath(const LatticeRay& ray, Vec3f& weight, Vec3d& glow, PathRandom& random) const;
-  // The same in three colours whose shadows are multiplied by `shadow`.
-  Vec3f transmittance(const LatticeRay& ray, float length, const Vec3f& shadow, PathRandom& random) const;
-  // An unbiased estimate of exp(-shadow * optical depth) along `length` from the origin of `ray` on.
-  float transmittance(const LatticeRay& ray, float length, float shadow, PathRandom& random) const;
-  float density(const Vec3f& p) const;
-  // What the albedo is multiplied by.
-  Vec3f colour(const Vec3f& p) const;
-  // As the marcher interpolates.
-  static float valueAt(const MarchScene::Bricks& bricks, const Vec3f& p);
-  // A ray through any point of the lens at any time, as the volume sees it.
-  Ray blurredRay(double x, double y, PathRandom& random) const;
-  // Where a ray of the camera enters the volume; false if it misses it.
-  bool enter(const Ray& ray, LatticeRay& out) const;
-  void trace(const Ray& camera, PathRandom& random, PathSums& sums) const;
-  // What a light at a place sends on along a path.
-  Vec3d local(const LocalLight& light, const Vec3f& at, const Vec3f& direction, const Vec3f& weight,
-              PathRandom& random) const;
-  // The sky in a direction drawn from the map.
-  Vec3d drawnSky(const Vec3f& at, const Vec3f& direction, const Vec3f& weight, PathRandom& random) const;
+  void start(int x, int y, std::uint64_t number, Path& path) const;
+  void follow(Wave& wave) const;
+  Ray inVolume(const Path& path, const Ray& ray) const;
+  void prepareFlight(Path& path, std::optional<Surfaces::Hit>& hit, Flight& flight) const;
+  bool arrive(std::uint32_t index, Flight& flight, const std::optional<Surfaces::Hit>& hit, Wave& wave) const;
+  bool meetFirst(Path& path, const Vec3f& weight, double distance, const Vec3f* objectColour) const;
+  bool survives(Path& path) const;
+  bool scatter(std::uint32_t index, const Meeting& meeting, Wave& wave) const;
+  float shareOf(const Meeting& meeting, const Vec3f& towards) const;
+  void lookAtLights(std::uint32_t index, const Meeting& meeting, Wave& wave) const;
+  void leave(std::uint32_t index, Wave& wave) const;
+  void add(std::uint32_t index, std::size_t light, const Vec3f& radiance, Wave& wave) const;
+  void finish(Wave& wave, std::vector<PathSums>& sums) const;
 
-  Medium medium_;
-  const Lights& lights_;
-  const Environment* skyMap_ = nullptr;
-  Affine latticeToWorld_;
-  const Camera& camera_;
-  Shutter shutter_;
-  const RigidMotion* motion_;
+  const RenderScene& scene_;
   const PathOptions& options_;
-  MarchScene scene_;
+  const Progress& progress_;
+  const Surfaces* surfaces_;
+  bool isDeep_;
+  PathVolume volume_;
   std::vector<Sun> suns_;
-  Affine map_;
-  Vec3d shift_;
-  Box bounds_;
-  // Extinction of every colour relative to the largest, and of density 1.
-  Vec3f colour_{1, 1, 1};
-  float perEmission_ = 0.0f;
-  // Of the extinction where something glows, which may have none.
-  float leastBound_ = 0.0f;
-  bool isColoured_ = false;
-  bool hasSky_ = false;
-  bool blurred_ = false;
-  // Makes walks end whatever the extinction is.
-  float leastStep_ = 0.0f;
+  std::vector<std::shared_ptr<const DeepShadowMap>> localMaps_;
+  const Environment* skyMap_;
+  std::size_t layers_, skyLayer_;
 };
 
 }  // namespace nephele::detail

@@ -426,7 +426,6 @@ TEST(GridlessVolume, RefusesOptionsWithoutMeaning) {
   }
   EXPECT_THROW(gridlessVolume(crisp(), {}, kVoxel), Error);
   EXPECT_THROW(gridlessVolume(crisp(), kBox, -1), Error);
-  EXPECT_THROW(pathTraceImage(volume, medium(1), kLights, camera, {}), Error);
 }
 
 }  // namespace

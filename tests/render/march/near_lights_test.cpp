@@ -202,7 +202,7 @@ TEST(NearLights, MarcherOfOneOctaveAgreesWithThePathTracer) {
   RenderOptions once = singleScattering(64);
   once.aovs = {"light"};
   PathOptions paths;
-  paths.samplesPerPixel = 4000;
+  paths.samplesPerPixel = 16000;
   paths.maxScatterings = 1;
   paths.aovs = {"light"};
   const Image marched = renderImage(volume, cloud, lights, camera, once).image;
@@ -212,7 +212,8 @@ TEST(NearLights, MarcherOfOneOctaveAgreesWithThePathTracer) {
     double a = 0, b = 0;
     for (int y = 0; y != 12; ++y)
       for (int x = 0; x != 16; ++x) a += marched.at(name, x, y), b += traced.at(name, x, y);
-    // 768000 paths: noise of 0.2 %.
+    // 3 million paths: a standard error of 0.25 % where the spot shines, which few of them meet, as measured
+    // over seeds.
     EXPECT_NEAR(a, b, 0.01 * b) << name;
     EXPECT_GT(b, 0.1) << name;
   }

@@ -1,0 +1,149 @@
+// What paths meet of a field: the same as of a grid, with bounds from the ranges of its cells.
+//
+// Where tentative collisions are does not depend on the densities there. So every way lays some of them
+// ahead, those of all ways are evaluated together, and the ways that go on lay more.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "nephele/render/march/detail/path_volume.h"
+
+namespace nephele::detail {
+
+namespace {
+
+// Tentative collisions that a way lays at first, and at most.
+constexpr std::size_t kAhead = 4, kMostAhead = 32;
+
+float largest(const Vec3f& v) {
+  return std::max({v.x, v.y, v.z});
+}
+
+}  // namespace
+
+// Follows a way from where it enters the field; false if it misses it.
+void PathVolume::follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,
+                        Scratch& scratch) const {
+  double first = 0, last = length;
+  for (int axis = 0; axis != 3; ++axis) {
+    const double low = double(bounds_.min[axis]) - ray.origin[axis],
+                 high = double(bounds_.max[axis]) - ray.origin[axis];
+    if (ray.direction[axis] == 0) {
+      if (low > 0 || high < 0) return;
+      continue;
+    }
+    const double a = low / ray.direction[axis], b = high / ray.direction[axis];
+    first = std::max(first, std::min(a, b));
+    last = std::min(last, std::max(a, b));
+  }
+  if (!(last > first)) return;
+  const FieldDensity::Line line{Vec3f(ray.origin + ray.direction * first), Vec3f(ray.direction),
+                                float(last - first)};
+  Scratch::Track& track = scratch.tracks.emplace_back(
+      Scratch::Track{way, first, line, FieldDensity::Walk(*field_, line), random});
+  track.depth = track.random.depth();
+}
+
+// Goes on to the next tentative collision; false at the end of the line. `isResidual`: of what the density
+// has above its least.
+bool PathVolume::advance(Scratch::Track& track, float extinction, bool isResidual) const {
+  for (;;) {
+    if (!track.hasSpan) {
+      if (!track.walk.next(track.span)) return false;
+      track.hasSpan = true;
+      track.s = track.span.begin;
+      Interval& range = track.span.range;
+      range = {std::min(range.min, mostDensity_), std::min(range.max, mostDensity_)};
+    }
+    const float least = isResidual ? track.span.range.min : 0.0f,
+                bound = extinction * (track.span.range.max - least), step = track.depth / bound;
+    if (track.s + step < track.span.end) {
+      track.passed += extinction * least * step;
+      track.s += step;
+      track.depth = track.random.depth();
+      return true;
+    }
+    const float rest = track.span.end - track.s;
+    track.passed += extinction * least * rest;
+    track.depth = std::max(0.0f, track.depth - rest * bound);
+    track.hasSpan = false;
+  }
+}
+
+// Until every track is done: lets each lay tentative collisions, evaluates the densities that are asked for,
+// and hands them out.
+template <class Lay, class Answer>
+void PathVolume::followAll(Scratch& scratch, Lay&& lay, Answer&& answer) const {
+  for (std::size_t ahead = kAhead; !scratch.tracks.empty(); ahead = std::min(2 * ahead, kMostAhead)) {
+    scratch.tentative.clear();
+    scratch.batch.clear();
+    for (Scratch::Track& track : scratch.tracks) {
+      track.first = scratch.tentative.size();
+      while (scratch.tentative.size() != track.first + ahead && !track.isAtEnd) lay(track);
+      track.end = scratch.tentative.size();
+    }
+    const float* value = scratch.batch.eval(*field_).data();
+    for (Scratch::Track& track : scratch.tracks) {
+      track.isDone = false;
+      for (std::size_t i = track.first; i != track.end; ++i) {
+        const Scratch::Tentative& tentative = scratch.tentative[i];
+        const float density = tentative.isAsked ? std::min(*value++, mostDensity_) : tentative.range.max;
+        if (!track.isDone) track.isDone = !answer(track, tentative, density);
+      }
+      if (track.isAtEnd) track.isDone = true;
+    }
+    std::erase_if(scratch.tracks, [](const Scratch::Track& track) { return track.isDone; });
+  }
+}
+
+void PathVolume::flyThroughField(std::span<Flight> flights, Scratch& scratch) const {
+  scratch.tracks.clear();
+  for (std::size_t i = 0; i != flights.size(); ++i)
+    follow(std::uint32_t(i), flights[i].ray, flights[i].length, flights[i].random.fork(), scratch);
+  const auto lay = [&](Scratch::Track& track) {
+    if (!advance(track, extinction_, false)) {
+      track.isAtEnd = true;
+      return;
+    }
+    const Interval& range = track.span.range;
+    const float chance = track.random.next();
+    // Whatever the density is, it is real; nothing behind it matters.
+    const bool isSure = !isColoured_ && chance * range.max < range.min;
+    track.isAtEnd = isSure;
+    scratch.tentative.push_back({track.s, 0, range, chance, !isSure && !range.isPoint()});
+    if (scratch.tentative.back().isAsked) scratch.batch.add(*field_, track.line, track.s, track.span.region);
+  };
+  followAll(scratch, lay, [&](const Scratch::Track& track, const Scratch::Tentative& t, float density) {
+    Flight& flight = flights[track.way];
+    const double distance = track.start + double(t.s);
+    const float share = density / t.range.max;
+    if (isColoured_) return !isReal(flight, colour_ * std::min(share, 1.0f), distance);
+    if (!(t.chance < share)) return true;
+    flight.distance = distance;
+    return false;
+  });
+}
+
+void PathVolume::lookThroughField(std::span<ShadowWay> ways, Scratch& scratch) const {
+  scratch.tracks.clear();
+  for (std::size_t i = 0; i != ways.size(); ++i)
+    if (largest(ways[i].extinction) > 0)
+      follow(std::uint32_t(i), ways[i].ray, ways[i].length, ways[i].random.fork(), scratch);
+  const auto lay = [&](Scratch::Track& track) {
+    track.isAtEnd = !advance(track, extinction_ * largest(ways[track.way].extinction), true);
+    // What was passed to the end is a tentative collision with nothing.
+    const Interval range = track.isAtEnd ? Interval::of(0) : track.span.range;
+    scratch.tentative.push_back({track.s, std::exchange(track.passed, 0.0f), range, 0, !track.isAtEnd});
+    if (!track.isAtEnd) scratch.batch.add(*field_, track.line, track.s, track.span.region);
+  };
+  followAll(scratch, lay, [&](const Scratch::Track& track, const Scratch::Tentative& t, float density) {
+    ShadowWay& way = ways[track.way];
+    const float most = largest(way.extinction);
+    dim(way, t.passed / most);
+    if (t.isAsked)
+      way.left = way.left * (Vec3f{1, 1, 1} - way.extinction * (residualOf(density, t.range) / most));
+    return isWorthwhile(way);
+  });
+}
+
+}  // namespace nephele::detail

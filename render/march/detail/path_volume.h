@@ -1,0 +1,172 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "nephele/modeling/base/box.h"
+#include "nephele/modeling/base/math.h"
+#include "nephele/render/march/detail/deep_pixel.h"
+#include "nephele/render/march/detail/path_random.h"
+#include "nephele/render/scene/camera.h"
+#include "nephele/render/scene/holdout_curve.h"
+#include "nephele/render/scene/medium.h"
+#include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/lattice_map.h"
+#include "nephele/render/volume/march_scene.h"
+#include "nephele/render/volume/render_volume.h"
+
+namespace nephele::detail {
+
+/// What lies between the camera and what a path of it meets.
+struct Foreground {
+  HoldoutCurve holdout{};
+  /// Of the angle between the ray and the line of sight.
+  double cosine = 1.0;
+  /// Opacity that is seen, per colour.
+  Vec3f opacity{};
+  /// What glows on the way, for deep pictures; null where nobody asks.
+  std::vector<DeepPixel::Event>* glow = nullptr;
+
+  float heldAt(double distance) const {
+    std::size_t cursor = 0;
+    return holdout.empty() ? 1.0f : holdout.transmittance(float(distance * cosine), cursor);
+  }
+};
+
+/// A path's way to its next collision, in the space of the volume. What is known before, then what is found.
+struct Flight {
+  Ray ray;
+  double length = std::numeric_limits<double>::infinity();
+  PathRandom random;
+  /// Of a ray of the camera; null for all others.
+  Foreground* foreground = nullptr;
+
+  /// Of the path, per colour, before and after; and what it was in front of the collision.
+  Vec3f weight{1, 1, 1}, arriving{1, 1, 1};
+  /// Light of what glows on the way, weighed.
+  Vec3d glow{};
+  /// To the collision; infinite if there is none.
+  double distance = std::numeric_limits<double>::infinity();
+};
+
+/// A way on which a light is looked at, in the space of the volume, and an unbiased estimate of what is left
+/// of it, per colour.
+struct ShadowWay {
+  Ray ray;
+  double length = std::numeric_limits<double>::infinity();
+  PathRandom random;
+  /// Multiplies the extinction.
+  Vec3f extinction{1, 1, 1};
+
+  Vec3f left{1, 1, 1};
+};
+
+/// A volume as paths see it, be it a grid or a field: free paths by delta tracking, transmittances by
+/// residual ratio tracking. Both step by what bounds of the density allow.
+class PathVolume {
+ public:
+  /// Keeps a reference to `volume`.
+  PathVolume(const RenderVolume& volume, const Medium& medium);
+
+  /// Working memory of one thread.
+  class Scratch {
+    friend class PathVolume;
+
+    struct Track;
+    struct Tentative;
+    std::vector<Track> tracks;
+    std::vector<Tentative> tentative;
+    FieldDensity::Batch batch;
+  };
+
+  /// What becomes of one way does not depend on the others.
+  void fly(std::span<Flight> flights, Scratch& scratch) const;
+  void look(std::span<ShadowWay> ways, Scratch& scratch) const;
+
+  /// Of the medium, times the colour of the volume there.
+  Vec3f albedoAt(const Vec3d& place) const;
+  /// Extinction of every colour relative to the largest.
+  const Vec3f& colour() const { return colour_; }
+  /// Of density 1, in the most opaque colour.
+  float extinction() const { return extinction_; }
+  bool glows() const { return scene_.emission.table; }
+  /// Whether many ways at a time are quicker than one after the other.
+  bool isField() const { return field_; }
+  /// Shorter distances are of no account.
+  float least() const { return least_; }
+
+ private:
+  struct Part;
+
+  template <class RateOf, class Meet, class Leave>
+  void collide(const Part& part, PathRandom& random, RateOf&& rateOf, Meet&& meet, Leave&& leave) const;
+  bool enter(const Ray& ray, double length, Part& out) const;
+  void fly(Flight& flight) const;
+  void flyInColours(const Part& part, Flight& flight) const;
+  void look(ShadowWay& way) const;
+  float densityAt(const Vec3f& p) const;
+  Interval boundsOf(const Interval& range) const;
+
+  // A tentative collision is real by a chance that lies between those of the colours, by their weights, and
+  // each weight makes up for it (spectral tracking, Kutz, Habel, Li and Novak 2017). `real`: how likely it is
+  // to each of them.
+  static bool isReal(Flight& flight, const Vec3f& real, double distance);
+  static float residualOf(float density, const Interval& range);
+  static bool isWorthwhile(ShadowWay& way);
+  static void dim(ShadowWay& way, float depth);
+
+  void follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,
+              Scratch& scratch) const;
+  bool advance(Scratch::Track& track, float extinction, bool isResidual) const;
+  template <class Lay, class Answer>
+  void followAll(Scratch& scratch, Lay&& lay, Answer&& answer) const;
+  void flyThroughField(std::span<Flight> flights, Scratch& scratch) const;
+  void lookThroughField(std::span<ShadowWay> ways, Scratch& scratch) const;
+
+  const FieldDensity* field_ = nullptr;
+  MarchScene scene_;
+  LatticeMap toLattice_;
+  Box bounds_;
+  Vec3f albedo_;
+  float extinction_ = 1.0f;
+  Vec3f colour_{1, 1, 1};
+  // Of what glows; and of the bound of the extinction where something does, which may have none.
+  float perEmission_ = 0.0f, leastBound_ = 0.0f;
+  bool isColoured_ = false;
+  // Larger densities count as this, so that walks end whatever the extinction is.
+  float mostDensity_ = 0.0f, opaqueDensity_ = 0.0f, least_ = 0.0f;
+};
+
+/// A way through a field.
+struct PathVolume::Scratch::Track {
+  // Which of the ways that are asked for, and where on it the line begins.
+  std::uint32_t way;
+  double start;
+  FieldDensity::Line line;
+  FieldDensity::Walk walk;
+  PathRandom random;
+  // The part of the line that is being crossed, where on it, and the optical depth to the next tentative
+  // collision.
+  FieldDensity::Span span{};
+  bool hasSpan = false;
+  float s = 0.0f, depth = 0.0f;
+  // Optical depth that was passed without doubt since the last tentative collision.
+  float passed = 0.0f;
+  // Whether the end of the line has been reached, or nothing more needs to be known.
+  bool isAtEnd = false, isDone = false;
+  std::size_t first = 0, end = 0;
+};
+
+/// A tentative collision whose density is asked for together with others.
+struct PathVolume::Scratch::Tentative {
+  float s, passed;
+  // Of the density there.
+  Interval range;
+  // In [0, 1).
+  float chance;
+  bool isAsked;
+};
+
+}  // namespace nephele::detail
