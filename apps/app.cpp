@@ -7,7 +7,6 @@
 // configuration files again.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <iostream>
 #include <new>
 
@@ -63,11 +62,10 @@ void addCommonOptions(CLI::App& app, CommonOptions& options) {
 
 void writeStatistics(const std::string& path, const nlohmann::json& statistics) {
   OutputFile output(path);
-  std::ofstream file(output.temporaryPath());
+  OutputStream stream(output);
   // Names may be in any encoding, but JSON is UTF-8.
-  file << statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-  file.close();
-  require(file.good(), fmt::format("{}: could not be written", path));
+  stream.write(statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + '\n');
+  stream.close();
   output.commit();
 }
 
@@ -81,15 +79,9 @@ std::vector<std::string> optionNames(const CLI::App& app) {
   return names;
 }
 
-/// Lines stay lines; what else a file may have in its names does not reach the terminal.
+/// One line: what names of files and of what is in them hold beside letters does not reach the terminal.
 void printError(const std::string& who, std::string_view what) {
-  std::string text;
-  for (std::size_t begin = 0; begin <= what.size();) {
-    const std::size_t end = std::min(what.find('\n', begin), what.size());
-    text += (begin > 0 ? "\n" : "") + printable(what.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  std::cerr << who << ": error: " << text << '\n';
+  std::cerr << who << ": error: " << printable(what) << '\n';
 }
 
 int usageError(const std::string& who, const std::string& what) {
@@ -118,6 +110,9 @@ int runBody(const Verb& verb, CLI::App& app, ProgramRun& run, const CommonOption
   } catch (const std::bad_alloc&) {
     run.finish();
     std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
+  } catch (const SeveralErrors& errors) {
+    run.finish();
+    for (const std::string& message : errors.messages()) printError(who, message);
   } catch (const std::exception& error) {
     run.finish();
     printError(who, error.what());

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <functional>
 #include <map>
 #include <memory>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "apps/options/options.h"
+#include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/progress.h"
 
 namespace nephele::apps {
@@ -41,6 +44,17 @@ class Run : public Progress {
   virtual void result(const std::string& line) const = 0;
 
   double memoryLimitBytes = 0;
+};
+
+/// What is wrong with several things, one line each.
+class SeveralErrors : public Error {
+ public:
+  explicit SeveralErrors(std::vector<std::string> messages)
+      : Error(fmt::format("{}", fmt::join(messages, "; "))), messages_(std::move(messages)) {}
+  const std::vector<std::string>& messages() const { return messages_; }
+
+ private:
+  std::vector<std::string> messages_;
 };
 
 /// One verb of the program.

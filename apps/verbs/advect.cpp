@@ -19,16 +19,23 @@ nlohmann::json stepsOf(const AdvectedGrids& result) {
   return steps;
 }
 
+void requireCarried(const CarriedGrids& input, const std::string& path) {
+  if (!input.box.isEmpty()) return;
+  const std::string others = fmt::format("{}", fmt::join(input.leftOut, ", "));
+  throw Error(fmt::format("{}: no grid of numbers or vectors holds anything{}", path,
+                          others.empty() ? "" : "; it holds " + others));
+}
+
 void carry(const AdvectArguments& arguments, Run& run) {
   AdvectionOptions options = arguments.resolved();
   run.begin("read");
   run.expect(0, 0.05);
   const CarriedGrids input =
       namingFile(arguments.input, [&] { return carriedGrids(readVdbFile(arguments.input)); });
+  requireCarried(input, arguments.input);
   for (const std::string& grid : input.leftOut)
     run.note(
         fmt::format("{}: grid {} is left out: only numbers and vectors are carried", arguments.input, grid));
-  require(!input.box.isEmpty(), arguments.input + ": no grid of numbers or vectors holds anything");
   if (!arguments.continueFrom.empty()) options.startMap = readFlowMap(arguments.continueFrom);
   const VectorField velocity = arguments.velocity.field(input.box.longestSide());
   run.requireMemory(

@@ -32,8 +32,8 @@ void requirePiecesMemory(const Knives& knives, std::size_t parts, const Run& run
   const auto n = double(knives.planes.size() + knives.rough.size());
   const double most =
       n + n * (n - 1) / 2 + n * (n - 1) * (n - 2) / 6 + double(knives.cells.size()) + double(parts);
+  run.requireMemory(kBytesPerPiece * most, fmt::format("use fewer knives than {:g}", n));
   if (most > kMany) run.note(fmt::format("{:g} knives: this may make up to {:.2g} pieces", n, most));
-  run.requireMemory(kBytesPerPiece * most, "use fewer knives");
 }
 
 void cut(const CutArguments& arguments, Run& run) {

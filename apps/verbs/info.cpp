@@ -41,7 +41,7 @@ void print(const Run& run, const std::string& indent, const std::string& name, c
 }
 
 void describeFiles(const InfoOptions& options, Run& run) {
-  std::string errors;
+  std::vector<std::string> errors;
   run.stats["files"] = nlohmann::json::array();
   for (const std::string& path : options.files) {
     run.begin("describe");
@@ -53,12 +53,12 @@ void describeFiles(const InfoOptions& options, Run& run) {
       throw;
     } catch (const Error& error) {
       description["error"] = error.what();
-      errors += (errors.empty() ? "" : "\n") + std::string(error.what());
+      errors.emplace_back(error.what());
     }
     description["path"] = path;
     run.stats["files"].push_back(nlohmann::json(description));
   }
-  require(errors.empty(), errors);
+  if (!errors.empty()) throw SeveralErrors(std::move(errors));
 }
 
 void bindOptions(CLI::App& app, InfoOptions& options) {

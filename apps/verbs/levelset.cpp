@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "apps/app.h"
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -41,23 +39,17 @@ void bindOptions(CLI::App& app, LevelsetOptions& options) {
   addSubdivide(app, options.subdivide);
 }
 
-/// A wrap need not be finer than voxels are.
-MeshRepairOptions repairFor(const LevelsetOptions& options, double longestSide) {
-  MeshRepairOptions repair = options.repair;
-  const double voxel = options.voxelSizeOption->count() > 0
-                           ? options.voxelSize.worldUnits(longestSide) / longestSide
-                           : 1.0 / options.resolution;
-  const double coarser = std::clamp(voxel / repair.wrapAlpha, 1.0, 1 / repair.wrapAlpha);
-  repair.wrapAlpha *= coarser;
-  repair.wrapOffset *= coarser;
-  return repair;
+double voxelSizeOf(const LevelsetOptions& options, double longestSide) {
+  return options.voxelSizeOption->count() > 0 ? options.voxelSize.worldUnits(longestSide)
+                                              : longestSide / options.resolution;
 }
 
 void convert(const LevelsetOptions& options, Run& run) {
   run.begin("read");
   const Mesh soup = readMesh(options.input);
   run.begin("repair");
-  const MeshRepairOptions repair = repairFor(options, boundingBox(soup).longestSide());
+  MeshRepairOptions repair = options.repair;
+  repair.voxelSize = voxelSizeOf(options, boundingBox(soup).longestSide());
   RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, repair, run); });
   for (const std::string& what : repaired.repairs) run.note(what);
   if (options.subdivide > 0) {
@@ -67,9 +59,7 @@ void convert(const LevelsetOptions& options, Run& run) {
   }
 
   MeshToLevelSetOptions conversion = options.conversion;
-  const double longestSide = repaired.after.box.longestSide();
-  conversion.voxelSize = options.voxelSizeOption->count() > 0 ? options.voxelSize.worldUnits(longestSide)
-                                                              : longestSide / options.resolution;
+  conversion.voxelSize = voxelSizeOf(options, repaired.after.box.longestSide());
   run.requireMemory(
       estimateLevelSetBytes(repaired.mesh, conversion),
       "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");

@@ -235,21 +235,9 @@ void writeMesh(const std::string& path, const Mesh& mesh) {
                       extension));
 
   OutputFile output(path);
-  std::FILE* stream = std::fopen(output.temporaryPath().c_str(), "wb");
-  if (!stream) throw Error(fmt::format("cannot write {}: {}", path, std::generic_category().message(errno)));
-  errno = 0;
-  try {
-    write(stream, mesh);
-  } catch (...) {
-    std::fclose(stream);
-    throw;
-  }
-  // A full disk may show only when the last buffer is flushed or the file is closed.
-  const bool failed = std::ferror(stream) != 0 || std::fflush(stream) != 0;
-  const int writeError = errno;
-  if (std::fclose(stream) != 0 || failed)
-    throw Error(fmt::format("cannot write {}: {}", path,
-                            std::generic_category().message(failed ? writeError : errno)));
+  OutputStream stream(output);
+  write(stream.file(), mesh);
+  stream.close();
   output.commit();
 }
 

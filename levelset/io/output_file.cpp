@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "nephele/modeling/base/error.h"
 
@@ -152,6 +153,53 @@ void OutputFile::commit() {
 
 void OutputFile::withdraw() noexcept {
   if (committed_ && !isStream_) ::unlink(target_.c_str());
+}
+
+OutputStream::OutputStream(const OutputFile& output)
+    : output_(output), file_(std::fopen(output.temporaryPath().c_str(), "wb")) {
+  if (!file_) {
+    error_ = errno;
+    fail();
+  }
+  // Writers through C's library leave the reason there.
+  errno = 0;
+}
+
+OutputStream::~OutputStream() {
+  if (file_) std::fclose(file_);
+}
+
+void OutputStream::fail() const {
+  throw Error(fmt::format("cannot write {}: {}", output_.path(), reason(error_)));
+}
+
+void OutputStream::requireWritten() const {
+  if (error_ != 0) fail();
+}
+
+void OutputStream::write(std::string_view bytes) {
+  requireWritten();
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
+  error_ = errno;
+  fail();
+}
+
+std::uint64_t OutputStream::position() {
+  return std::uint64_t(::ftello(file_));
+}
+
+void OutputStream::seek(std::uint64_t position) {
+  requireWritten();
+  if (::fseeko(file_, off_t(position), SEEK_SET) == 0) return;
+  error_ = errno;
+  fail();
+}
+
+void OutputStream::close() {
+  const bool failed = error_ != 0 || std::ferror(file_) != 0 || std::fflush(file_) != 0;
+  if (failed && error_ == 0) error_ = errno != 0 ? errno : EIO;
+  if (std::fclose(std::exchange(file_, nullptr)) != 0 && error_ == 0) error_ = errno;
+  requireWritten();
 }
 
 void commitTogether(std::span<OutputFile* const> outputs) {

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
+#include <cstdio>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace nephele {
 
@@ -42,6 +45,38 @@ class OutputFile {
   std::string temporary_;
   void* entry_ = nullptr;  // where discardAllOutputs finds the temporary
   bool committed_ = false;
+};
+
+/// What is written of an output, with every fault of the disk told: also those that show only when the last
+/// bytes leave the buffer.
+class OutputStream {
+ public:
+  /// Opens the temporary of `output`, which must outlive this. @throws Error naming the path.
+  explicit OutputStream(const OutputFile& output);
+  ~OutputStream();
+  OutputStream(const OutputStream&) = delete;
+  OutputStream& operator=(const OutputStream&) = delete;
+
+  /// For those who write through C's library; they need not look for errors.
+  std::FILE* file() const { return file_; }
+
+  /// @throws Error naming the path and the reason.
+  void write(std::string_view bytes);
+  std::uint64_t position();
+  void seek(std::uint64_t position);
+
+  /// @throws Error naming the path and the reason if anything was not written.
+  void close();
+
+  /// Throws what `close` would, where writing has failed already.
+  void requireWritten() const;
+
+ private:
+  [[noreturn]] void fail() const;
+
+  const OutputFile& output_;
+  std::FILE* file_;
+  int error_ = 0;  // of the first call that failed
 };
 
 /// Commits all, in this order: files that mean something only together. Where one cannot be renamed, those

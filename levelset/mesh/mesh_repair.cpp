@@ -34,6 +34,7 @@ constexpr double kNearlyEqual = 1e-6;    // share of the longest side
 constexpr double kThinnest = 1e-5;       // mean thickness, share of the longest side
 constexpr double kSmallest = 1e-9;       // volume, share of the cube over the longest side
 constexpr double kMostNewSurface = 0.9;  // filled area / area of a part
+constexpr double kMostOfAShell = 1.5;    // mean thickness / twice the offset of the wrap
 
 std::string counted(std::size_t count, const char* one, const char* many) {
   return fmt::format("{} {}", count, count == 1 ? one : many);
@@ -267,23 +268,64 @@ class Ladder {
                   share));
     progress_.begin("wrap");
     const double side = static_cast<double>(result_.before.box.longestSide());
-    const double alpha = options_.wrapAlpha * side, offset = options_.wrapOffset * side;
-    result_.mesh =
-        detail::withVertexAttributesOf(result_.mesh, detail::wrapped(result_.mesh, alpha, offset, progress_));
+    double coarser = 1;
+    if (options_.voxelSize) {
+      const double voxel = *options_.voxelSize / side;
+      coarser = std::clamp(voxel / options_.wrapAlpha, 1.0, 1 / options_.wrapAlpha);
+    }
+    const double alphaShare = options_.wrapAlpha * coarser, offsetShare = options_.wrapOffset * coarser;
+    const double alpha = alphaShare * side, offset = offsetShare * side;
+    refuseThinShell(alpha, offset);
+    const Mesh wrap = detail::wrapped(result_.mesh, alpha, offset, progress_);
+    const double thickness = meanThickness(wrap);
+    const bool isSheet = isShell(offset, thickness);
+    if (isSheet) requireHeld(offset, thickness);
+    result_.mesh = detail::withVertexAttributesOf(result_.mesh, wrap);
     // What was done before does not show in the wrap.
     result_.repairs.clear();
     report(
         fmt::format("wrapped with alpha {:.3g} ({:.2g} % of the longest side), offset {:.3g} ({:.2g} %): {}",
-                    alpha, 100 * options_.wrapAlpha, offset, 100 * options_.wrapOffset, why));
+                    alpha, 100 * alphaShare, offset, 100 * offsetShare, why));
     progress_.check();
-    // A shell on both sides of a sheet holds half of its own area times its thickness; a solid far more.
-    constexpr double kMostOfAShell = 1.5;
-    const double shell = surfaceArea(result_.mesh) / 2 * 2 * offset;
-    if (!result_.before.closed() && signedVolume(result_.mesh) < kMostOfAShell * shell)
+    if (isSheet)
       report(
           fmt::format("the surface is open, so that the wrap is a shell about {:.3g} thick around it, not a "
                       "solid; close what is open for a solid",
                       2 * offset));
+  }
+
+  // A shell on both sides of a sheet holds half of its own area times its thickness; a solid far more.
+  static double meanThickness(const Mesh& closed) { return 2 * signedVolume(closed) / surfaceArea(closed); }
+
+  // Whether a wrap of that offset is a shell around an open surface.
+  bool isShell(double offset, double thickness) const {
+    return !result_.before.closed() && thickness < kMostOfAShell * 2 * offset;
+  }
+
+  // A wrap takes seconds. What balls of a coarser one pass through, those of a finer pass through, so that a
+  // coarse one tells of a shell ahead.
+  void refuseThinShell(double alpha, double offset) const {
+    constexpr double kCoarse = 4;
+    const double side = static_cast<double>(result_.before.box.longestSide());
+    const bool mayBeThin = options_.voxelSize && 2 * offset < *options_.voxelSize;
+    if (result_.before.closed() || !mayBeThin || kCoarse * alpha > side) return;
+    const double thickness =
+        meanThickness(detail::wrapped(result_.mesh, kCoarse * alpha, kCoarse * offset, progress_));
+    if (isShell(kCoarse * offset, thickness)) requireHeld(offset, thickness - 2 * (kCoarse - 1) * offset);
+  }
+
+  void requireHeld(double offset, double thickness) const {
+    if (!options_.voxelSize || thickness >= *options_.voxelSize) return;
+    // Marching cubes keep walls of two voxels.
+    constexpr double kKept = 2.2;
+    const double side = static_cast<double>(result_.before.box.longestSide());
+    const double better = 2 * options_.wrapOffset * side / kKept;
+    throw Error(fmt::format(
+        "mesh repair: the surface is open ({}), so that its wrap is a shell about {:.3g} thick, not a solid, "
+        "too thin for a voxel size of {:.4g}; close what is open for a solid, or try resolution {:.0f} "
+        "(voxel size {:.4g}) for the shell",
+        joined(result_.before.problems()), 2 * offset, *options_.voxelSize, std::ceil(side / better),
+        better));
   }
 
   const Mesh& source_;

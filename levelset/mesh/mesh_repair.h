@@ -69,6 +69,9 @@ struct MeshRepairOptions {
   /// Alpha and offset of the wrap as a share of the bounding box's longest side.
   double wrapAlpha = 1.0 / 100;
   double wrapOffset = 1.0 / 600;
+  /// Edge of the voxels that the mesh is for, world units. Alpha is then no finer than they are, the offset
+  /// in proportion, and an open surface whose wrap is a shell that they cannot hold is refused.
+  std::optional<double> voxelSize{};
 };
 
 /// A closed, outward-oriented triangle mesh without equal positions, and what was done to get there, in
@@ -86,7 +89,7 @@ struct RepairedMesh {
 /// of the mesh. Corner attributes and groups survive until faces are added: a mesh with filled holes or
 /// wrapped has none.
 /// @throws Error saying what is wrong and which option would allow it (mode off on an open mesh; a flat mesh
-/// without volume; nothing left); Cancelled.
+/// without volume; a shell thinner than voxels; nothing left); Cancelled.
 RepairedMesh repairMesh(const Mesh& mesh, const MeshRepairOptions& options = {},
                         const Progress& progress = silent());
 

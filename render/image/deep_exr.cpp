@@ -19,6 +19,7 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
+#include "nephele/render/image/detail/exr_stream.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/image_file.h"
 
@@ -50,8 +51,8 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageC
   for (const char* name : {"Z", "ZBack"}) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
   for (const char* name : {"A", "R", "G", "B"}) header.channels().insert(name, Imf::Channel(Imf::HALF));
 
-  try {
-    Imf::DeepScanLineOutputFile file(output.temporaryPath().c_str(), header);
+  detail::writeWhole(output, [&](Imf::OStream& stream) {
+    Imf::DeepScanLineOutputFile file(stream, header);
     const auto width = std::size_t(image.width);
     std::vector<unsigned> counts(width);
     std::vector<const char*> pointers[6];
@@ -88,9 +89,7 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageC
       file.setFrameBuffer(frame);
       file.writePixels(1);
     }
-  } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be written: {}", output.path(), error.what()));
-  }
+  });
 }
 
 void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const ImageCamera& camera,

@@ -26,6 +26,7 @@
 #include "nephele/modeling/base/printable.h"
 #include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
+#include "nephele/render/image/detail/exr_stream.h"
 #include "nephele/render/image/image_file.h"
 
 namespace nephele {
@@ -188,13 +189,11 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
                                                   pitch * sizeof(float)));
     }
   }
-  try {
-    Imf::OutputFile file(output.temporaryPath().c_str(), header);
+  detail::writeWhole(output, [&](Imf::OStream& stream) {
+    Imf::OutputFile file(stream, header);
     file.setFrameBuffer(frame);
     file.writePixels(image.height);
-  } catch (const std::exception& error) {
-    throw Error(fmt::format("{}: cannot be written: {}", output.path(), error.what()));
-  }
+  });
 }
 
 void detail::readExrFile(const std::string& path, const ImageReader& reader) {

@@ -22,6 +22,7 @@
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/system.h"
+#include "nephele/render/image/detail/movie_check.h"
 
 extern char** environ;
 
@@ -158,8 +159,16 @@ void MovieWriter::end() {
   while (::waitpid(process_->id, &status, 0) < 0 && errno == EINTR) {
   }
   process_->id = -1;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-  throw Error(fmt::format("{}: cannot be written: ffmpeg failed: {}", path_, process_->said()));
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    // ffmpeg says nothing of a disk that is full.
+    require(detail::isWholeMovie(process_->output.temporaryPath()),
+            fmt::format("{}: cannot be written whole; the disk may be full", path_));
+    return;
+  }
+  // The system ends it so where a file may not grow any more.
+  const char* ended = WIFSIGNALED(status) ? sigdescr_np(WTERMSIG(status)) : nullptr;
+  throw Error(
+      fmt::format("{}: cannot be written: ffmpeg failed: {}", path_, ended ? ended : process_->said()));
 }
 
 void MovieWriter::add(const Image& frame, const ViewTransform& view) {

@@ -30,6 +30,13 @@ using File = std::unique_ptr<std::FILE, CloseFile>;
 [[noreturn]] void fail(png_structp, png_const_charp message) {
   throw Error(fmt::format("is damaged: {}", message));
 }
+[[noreturn]] void failToWrite(png_structp, png_const_charp message) {
+  throw Error(message);
+}
+void writeBytes(png_structp png, png_bytep bytes, std::size_t count) {
+  static_cast<OutputStream*>(png_get_io_ptr(png))->write({reinterpret_cast<const char*>(bytes), count});
+}
+void flushBytes(png_structp) {}
 void ignore(png_structp, png_const_charp) {}
 
 // What libpng holds of a file.
@@ -75,7 +82,7 @@ std::array<TransferCurve, 3> curvesOf(png_structp png, png_infop info) {
 }
 
 struct Writer : Handle {
-  Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {}
+  Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, failToWrite, ignore)) {}
   ~Writer() { png_destroy_write_struct(&png, &info); }
 };
 
@@ -89,13 +96,12 @@ struct Reader : Handle {
 void writePng(const std::string& path, const Image& image, const ViewTransform& view,
               const std::map<std::string, std::string>& metadata) {
   OutputFile output(path);
+  OutputStream stream(output);
   try {
     const auto width = std::size_t(image.width);
     const std::vector<std::uint8_t> bytes = screenBytes(image, view);
-    const File file(std::fopen(output.temporaryPath().c_str(), "wb"));
-    require(file != nullptr, "the file cannot be opened");
     const Writer writer;
-    png_init_io(writer.png, file.get());
+    png_set_write_fn(writer.png, &stream, writeBytes, flushBytes);
     png_set_IHDR(writer.png, writer.info, png_uint_32(image.width), png_uint_32(image.height), 8,
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
@@ -112,10 +118,11 @@ void writePng(const std::string& path, const Image& image, const ViewTransform& 
     for (std::size_t y = 0; y != std::size_t(image.height); ++y)
       png_write_row(writer.png, bytes.data() + y * width * 3);
     png_write_end(writer.png, nullptr);
-    require(std::fflush(file.get()) == 0, "the disk is full");
-  } catch (const std::exception& error) {
+  } catch (const Error& error) {
+    stream.requireWritten();
     throw Error(fmt::format("{}: cannot be written: {}", path, error.what()));
   }
+  stream.close();
   output.commit();
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -54,6 +55,15 @@ TEST_F(Info, ShowsNamesThatAreNotUtf8) {
   const ProgramResult result = runProgram("info " + path + " --stats " + folder_.file("stats.json"));
   EXPECT_EQ(result.exitCode, 0) << result.errors;
   EXPECT_TRUE(stats()["files"][0].contains("groups"));
+}
+
+TEST_F(Info, HasALineForEachFileThatCannotBeRead) {
+  const std::string first = write("a\nb.obj", "v 0 0 0\n"), second = write("c.obj", "f 1 2 3\n");
+  const ProgramResult result = runProgram("info '" + first + "' '" + second + "'");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 2) << result.errors;
+  EXPECT_NE(result.errors.find("a\\nb.obj: "), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("nephele info: error: " + second), std::string::npos) << result.errors;
 }
 
 TEST_F(Info, NamesTheProblemsOfAMesh) {

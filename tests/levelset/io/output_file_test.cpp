@@ -2,17 +2,16 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
@@ -179,27 +178,6 @@ TEST(OutputFile, CommitAfterDiscardingSaysThatItFailed) {
   EXPECT_NE(messageOf([&] { output.commit(); }).find("a.obj"), std::string::npos);
 }
 
-// A limit on the size of files stands in for a full disk: writing fails in the middle with EFBIG for ENOSPC.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    previousHandler_ = std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &previous_);
-    const rlimit limit{bytes, previous_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &previous_);
-    std::signal(SIGXFSZ, previousHandler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit previous_{};
-  void (*previousHandler_)(int);
-};
-
 TEST(OutputFile, FullDiskFailsTheMeshWritersAndLeavesNothing) {
   Mesh strip;
   for (int i = 0; i < 5000; ++i) {
@@ -213,7 +191,7 @@ TEST(OutputFile, FullDiskFailsTheMeshWritersAndLeavesNothing) {
       const TemporaryFolder folder;
       std::string message;
       {
-        const FullDisk full(bytes);
+        const test::FullDisk full(bytes);
         message = messageOf([&] { writeMesh(folder.file(name), strip); });
       }
       EXPECT_NE(message.find(folder.file(name)), std::string::npos) << message;

@@ -1,15 +1,14 @@
 #include "nephele/levelset/io/vdb_io.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
 
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"
@@ -381,17 +380,13 @@ TEST(VdbIo, NanoVdbFilesCutAnywhereAreRefused) {
 }
 
 TEST(VdbIo, AFullDiskLeavesAnErrorAndNoFile) {
-  // A limit on file size stands in for a full disk: writes beyond it fail.
   const TemporaryFolder folder;
   const VdbGrid grid = ballGrid(0.03);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const auto oldHandler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{20000, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
-  const std::string message = errorOf([&] { writeVdbFile(folder.file("full.vdb"), {grid}, {}); });
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, oldHandler);
+  std::string message;
+  {
+    const FullDisk full(20000);
+    message = errorOf([&] { writeVdbFile(folder.file("full.vdb"), {grid}, {}); });
+  }
   EXPECT_NE(message.find("full.vdb"), std::string::npos) << message;
   EXPECT_EQ(folder.entryCount(), 0u);
 }

@@ -255,6 +255,38 @@ TEST(MeshRepair, SaysThatAWrapOfAnOpenSurfaceIsAShell) {
       << "a closed surface becomes a solid";
 }
 
+TEST(MeshRepair, AShellThinnerThanVoxelsIsRefusedBeforeItIsMade) {
+  struct Steps final : Progress {
+    mutable std::atomic<int> count{0};
+    void advance(double) const override { ++count; }
+  };
+  Mesh open = test::icosphere(1, 3);
+  open.corners.resize(open.corners.size() - 3 * 400);
+  open.faceStart.resize(open.faceStart.size() - 400);
+  // At resolution 64 alpha is a voxel and the offset a sixth of it, so that the shell has a third.
+  const double voxel = 2.0 / 64;
+  const Steps refused, made;
+  try {
+    repairMesh(open, {.mode = Mode::wrap, .voxelSize = voxel}, refused);
+    ADD_FAILURE() << "a shell of a third of a voxel";
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("a shell about 0.0104 thick"), std::string::npos) << message;
+    // 1/300 of the side, 2.2 voxels.
+    EXPECT_NE(message.find("try resolution 660"), std::string::npos) << message;
+  }
+  const RepairedMesh shell =
+      repairMesh(open, {.mode = Mode::wrap, .wrapAlpha = 1.0 / 64, .wrapOffset = 1.0 / 384}, made);
+  EXPECT_EQ(shell.repairs.size(), 2u);
+  // A wrap four times coarser has a sixteenth of the points.
+  EXPECT_LT(4 * refused.count, made.count);
+
+  EXPECT_EQ(repairMesh(test::icosphere(1, 3), {.mode = Mode::wrap, .voxelSize = voxel}).repairs.size(), 1u);
+  // One face of 1280 is missing: half a voxel cannot pass.
+  const Mesh nearlyClosed = withoutFace(test::icosphere(1, 3), 7);
+  EXPECT_EQ(repairMesh(nearlyClosed, {.mode = Mode::wrap, .voxelSize = 0.2}).repairs.size(), 1u);
+}
+
 TEST(MeshRepair, AWrapStopsWhereItIsCancelled) {
   struct Stop final : Progress {
     mutable std::atomic<int> asked{0};

@@ -130,6 +130,36 @@ TEST(Movie, TellsWhatTheProgramSaysWhenItFails) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("a.mp4")));
 }
 
+// ffmpeg ends well, without a word, where the disk was full.
+TEST(Movie, RefusesAMovieThatIsNotWhole) {
+  if (const char* missing = whatIsMissing()) GTEST_SKIP() << missing;
+  const test::TemporaryFolder folder;
+  for (const std::string extension : {".mp4", ".mov", ".mkv"}) {
+    const std::string path = folder.file("a" + extension);
+    {
+      MovieWriter movie(path, 64, 36);
+      for (int i = 0; i != 4; ++i) movie.add(grey(64, 36, 0.2f * float(i)), {});
+      movie.finish();
+    }
+    const auto size = std::filesystem::file_size(path);
+    for (const auto kept : {std::uintmax_t(0), std::uintmax_t(40), size / 2, size - 1}) {
+      std::ofstream(folder.file("short")) << "#!/bin/sh\ncat >/dev/null\nfor last; do :; done\nhead -c "
+                                          << kept << " '" << path << "' >\"$last\"\n";
+      std::filesystem::permissions(folder.file("short"), std::filesystem::perms::owner_all);
+      const std::string cut = folder.file("cut" + extension);
+      MovieWriter movie(cut, 64, 36, {.program = folder.file("short")});
+      movie.add(grey(64, 36, 0.5f), {});
+      try {
+        movie.finish();
+        ADD_FAILURE() << kept << " of " << size << " bytes are a movie";
+      } catch (const Error& error) {
+        EXPECT_EQ(std::string(error.what()), cut + ": cannot be written whole; the disk may be full");
+      }
+      EXPECT_FALSE(std::filesystem::exists(cut));
+    }
+  }
+}
+
 TEST(Movie, RefusesBadSizesRatesAndFrames) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("a.mp4");
