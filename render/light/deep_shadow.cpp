@@ -35,15 +35,7 @@ constexpr double kSamplesPerPixel = 30;
 
 // Density at an index-space position, as the marcher interpolates.
 double densityAt(const BrickGrid& grid, const Vec3d& p) {
-  const Vec3d floor{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
-  const Vec3i cell{int(floor.x), int(floor.y), int(floor.z)};
-  const std::int32_t pool = grid.poolIndex(brickOf(cell));
-  if (!(grid.ranges()[std::size_t(pool)].max > 0)) return 0.0;
-  const Vec3f f(p - floor);
-  const float* at =
-      grid.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
-  constexpr int row = BrickGrid::kWidth;
-  return double(std::max(trilinear(at, f, row, row * row), 0.0f));
+  return double(std::max(sampleGrid(grid, p), 0.0f));
 }
 
 // One pixel's curve, simplified as it comes in.

@@ -10,6 +10,7 @@
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele::detail {
 
@@ -36,14 +37,11 @@ std::array<Between, kWide> places(int part, int factor) {
 
 void fill(const float* coarse, const Vec3i& part, int factor, float* out) {
   const auto x = places(part.x, factor), y = places(part.y, factor), z = places(part.z, factor);
-  const auto mix = [](float a, float b, float share) { return a + (b - a) * share; };
   for (const Between& k : z)
     for (const Between& j : y)
       for (const Between& i : x) {
-        const float* at = coarse + k.first * kPlane + j.first * kWide + i.first;
-        const auto row = [&](int offset) { return mix(at[offset], at[offset + 1], i.share); };
-        *out++ =
-            mix(mix(row(0), row(kWide), j.share), mix(row(kPlane), row(kPlane + kWide), j.share), k.share);
+        const float* first = coarse + k.first * kPlane + j.first * kWide + i.first;
+        *out++ = trilinear(first, {i.share, j.share, k.share}, kWide, kPlane);
       }
 }
 

@@ -18,6 +18,7 @@
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/volume/detail/brick_distances.h"
 #include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
 
@@ -211,20 +212,8 @@ void RenderVolume::measureBounds() {
 }
 
 float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
-  const Vec3f p = density_->worldToIndex()(world);
-  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
-  const Vec3f f = p - Vec3f(cell);
-  const auto valueOf = [&](const BrickGrid& grid) {
-    const float* at = grid.brick(grid.poolIndex(brickOf(cell))) +
-                      sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
-    float sum = 0;
-    for (int corner = 0; corner != 8; ++corner) {
-      const Vec3i d{corner & 1, corner >> 1 & 1, corner >> 2};
-      sum += (d.x ? f.x : 1 - f.x) * (d.y ? f.y : 1 - f.y) * (d.z ? f.z : 1 - f.z) *
-             std::max(at[(d.z * BrickGrid::kWidth + d.y) * BrickGrid::kWidth + d.x], 0.0f);
-    }
-    return sum;
-  };
+  const Vec3d place(density_->worldToIndex()(world));
+  const auto valueOf = [&](const BrickGrid& grid) { return std::max(sampleGrid(grid, place), 0.0f); };
   const float density = valueOf(*density_);
   return density > 0 && hasEmission() ? valueOf(*colour_.emission[std::size_t(colour)]) / density : 0.0f;
 }

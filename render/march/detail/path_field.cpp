@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "nephele/render/march/detail/path_volume.h"
+#include "nephele/render/volume/ray_span.h"
 
 namespace nephele::detail {
 
@@ -21,26 +22,15 @@ float largest(const Vec3f& v) {
 
 }  // namespace
 
-// Follows a way from where it enters the field; false if it misses it.
+// Follows a way from where it enters the field, if it does.
 void PathVolume::follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,
                         Scratch& scratch) const {
-  double first = 0, last = length;
-  for (int axis = 0; axis != 3; ++axis) {
-    const double low = double(bounds_.min[axis]) - ray.origin[axis],
-                 high = double(bounds_.max[axis]) - ray.origin[axis];
-    if (ray.direction[axis] == 0) {
-      if (low > 0 || high < 0) return;
-      continue;
-    }
-    const double a = low / ray.direction[axis], b = high / ray.direction[axis];
-    first = std::max(first, std::min(a, b));
-    last = std::min(last, std::max(a, b));
-  }
-  if (!(last > first)) return;
-  const FieldDensity::Line line{Vec3f(ray.origin + ray.direction * first), Vec3f(ray.direction),
-                                float(last - first)};
+  const RaySpan span = clipped({0, length}, ray.origin, ray.direction, bounds_);
+  if (span.isEmpty()) return;
+  const FieldDensity::Line line{Vec3f(ray.origin + ray.direction * span.near), Vec3f(ray.direction),
+                                float(span.far - span.near)};
   Scratch::Track& track = scratch.tracks.emplace_back(
-      Scratch::Track{way, first, line, FieldDensity::Walk(*field_, line), random});
+      Scratch::Track{way, span.near, line, FieldDensity::Walk(*field_, line), random});
   track.depth = track.random.depth();
 }
 

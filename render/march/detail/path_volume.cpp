@@ -14,7 +14,7 @@
 #include "nephele/levelset/grid/brick_box.h"
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/render/volume/brick_walk.h"
-#include "nephele/render/volume/trilinear.h"
+#include "nephele/render/volume/ray_span.h"
 
 namespace nephele::detail {
 
@@ -33,19 +33,9 @@ float largest(const Vec3f& v) {
   return std::max({v.x, v.y, v.z});
 }
 
-// Between the samples of a brick, as the marcher interpolates; p within the bricks.
-float valueAt(const float* values, const std::int32_t* table, const Vec3i& count, const Vec3f& p) {
-  Vec3i brick;
-  Vec3f local;
-  for (int axis = 0; axis != 3; ++axis) {
-    brick[axis] = std::clamp(int(p[axis] * 0.125f), 0, count[axis] - 1);
-    local[axis] = std::clamp(p[axis] - 8.0f * float(brick[axis]), 0.0f, 7.9999995f);
-  }
-  const Vec3i cell(local);
-  const float* samples =
-      values + std::size_t(table[BrickBox{{}, count}.numberOf(brick)]) * std::size_t(BrickGrid::kVolume);
-  return std::fmax(
-      0.0f, trilinear(samples + sampleOffset(cell.x, cell.y, cell.z), local - Vec3f(cell), kRow, kPlane));
+// Values below zero count as zero.
+float valueAt(const float* values, const MarchScene::ColourBricks& bricks, const Vec3f& p) {
+  return std::fmax(0.0f, GridSampler{values, bricks.table, bricks.count}(p));
 }
 
 }  // namespace
@@ -59,6 +49,8 @@ struct PathVolume::Part {
 
 PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
     : field_(volume.field()),
+      density_{volume.density().values().data(), volume.density().table().data(),
+               volume.density().brickCount()},
       toLattice_(volume.density().worldToIndex(), volume.density().firstBrick()),
       albedo_(medium.albedo),
       // That of the most opaque colour.
@@ -91,26 +83,15 @@ PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
 
 bool PathVolume::enter(const Ray& ray, double length, Part& out) const {
   const Vec3d origin = toLattice_.point(ray.origin), direction = toLattice_.vector(ray.direction);
-  double first = 0, last = length;
-  for (int axis = 0; axis != 3; ++axis) {
-    const double low = double(bounds_.min[axis]) - origin[axis],
-                 high = double(bounds_.max[axis]) - origin[axis];
-    if (direction[axis] == 0) {
-      if (low > 0 || high < 0) return false;
-      continue;
-    }
-    const double a = low / direction[axis], b = high / direction[axis];
-    first = std::max(first, std::min(a, b));
-    last = std::min(last, std::max(a, b));
-  }
-  out = {{Vec3f(origin + direction * first), Vec3f(direction)}, first, float(last - first)};
-  return last > first;
+  const RaySpan span = clipped({0, length}, origin, direction, bounds_);
+  out = {{Vec3f(origin + direction * span.near), Vec3f(direction)}, span.near, float(span.far - span.near)};
+  return !span.isEmpty();
 }
 
-// Calls visit(begin, end, cell) for the cells of 2^3 samples of a brick that a ray passes from `begin` to
-// `end`, with the first sample of each, until it returns false; whether it never did.
+// Calls visit(begin, end, cell) for the cells of a brick that a ray passes from `begin` to `end`, until it
+// returns false; whether it never did.
 template <class Visit>
-bool walkCells(const LatticeRay& ray, float begin, float end, const float* samples, Visit&& visit) {
+bool walkCells(const LatticeRay& ray, float begin, float end, Visit&& visit) {
   const Vec3f middle = ray.origin + ray.direction * (0.5f * (begin + end));
   Vec3i cell;
   Vec3f exits, perCell;
@@ -126,7 +107,7 @@ bool walkCells(const LatticeRay& ray, float begin, float end, const float* sampl
   for (float s = begin;;) {
     const int axis = exits.x <= exits.y ? (exits.x <= exits.z ? 0 : 2) : (exits.y <= exits.z ? 1 : 2);
     const float out = std::clamp(exits[axis], s, end);
-    if (out > s && !visit(s, out, samples + sampleOffset(cell.x, cell.y, cell.z))) return false;
+    if (out > s && !visit(s, out, cell)) return false;
     if (!(out < end)) return true;
     s = out;
     cell[axis] = std::clamp(cell[axis] + (ray.direction[axis] > 0 ? 1 : -1), 0, 7);
@@ -158,8 +139,8 @@ void PathVolume::collide(const Part& part, PathRandom& random, RateOf&& rateOf, 
     const Interval range = boundsOf(scene_.ranges[pool]);
     if (range.max <= opaqueDensity_ || range.isPoint()) return cross(begin, end, range);
     // Where voxels are opaque each has bounds of its own, or most of the work were nearly empty ones.
-    const float* samples = scene_.density.values + std::size_t(pool) * std::size_t(BrickGrid::kVolume);
-    return walkCells(part.ray, begin, end, samples, [&](float from, float to, const float* first) {
+    return walkCells(part.ray, begin, end, [&](float from, float to, const Vec3i& cell) {
+      const float* first = density_.firstOf(pool, cell);
       Interval corners = Interval::of(first[0]);
       for (const int offset : {1, kRow, kRow + 1, kPlane, kPlane + 1, kPlane + kRow, kPlane + kRow + 1}) {
         corners.min = std::min(corners.min, first[offset]);
@@ -175,18 +156,16 @@ Interval PathVolume::boundsOf(const Interval& range) const {
 }
 
 float PathVolume::densityAt(const Vec3f& p) const {
-  return std::fmin(valueAt(scene_.density.values, scene_.density.table, scene_.density.count, p),
-                   mostDensity_);
+  return std::clamp(density_(p), 0.0f, mostDensity_);
 }
 
 Vec3f PathVolume::albedoAt(const Vec3d& place) const {
   if (!scene_.colour.table) return albedo_;
   const Vec3f p(toLattice_.point(place));
-  const float there = valueAt(scene_.density.values, scene_.density.table, scene_.density.count, p);
+  const float there = density_(p);
   Vec3f result;
   for (int c = 0; c != 3 && there > 0; ++c)
-    result[c] =
-        albedo_[c] * valueAt(scene_.colour.values[c], scene_.colour.table, scene_.colour.count, p) / there;
+    result[c] = albedo_[c] * valueAt(scene_.colour.values[c], scene_.colour, p) / there;
   return result;
 }
 
@@ -246,7 +225,7 @@ void PathVolume::flyInColours(const Part& part, Flight& flight) const {
           Vec3f glow;
           for (int c = 0; c != 3; ++c)
             glow[c] = held * flight.weight[c] * perEmission_ / bound *
-                      valueAt(scene_.emission.values[c], scene_.emission.table, scene_.emission.count, p);
+                      valueAt(scene_.emission.values[c], scene_.emission, p);
           flight.glow += Vec3d(glow);
           if (flight.foreground && flight.foreground->glow && glow != Vec3f{})
             flight.foreground->glow->push_back({float(distance * flight.foreground->cosine), 0, glow});

@@ -16,6 +16,7 @@
 #include "nephele/render/volume/lattice_map.h"
 #include "nephele/render/volume/march_scene.h"
 #include "nephele/render/volume/render_volume.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele::detail {
 
@@ -126,6 +127,7 @@ class PathVolume {
   void lookThroughField(std::span<ShadowWay> ways, Scratch& scratch) const;
 
   const FieldDensity* field_ = nullptr;
+  GridSampler density_;
   MarchScene scene_;
   LatticeMap toLattice_;
   Box bounds_;

@@ -6,48 +6,25 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/render/volume/ray_span.h"
+
 namespace nephele::detail {
 
 namespace {
 
-// Directions in which the objects of a pixel look for the sky.
-constexpr int kSkyRays = 64;
-
-constexpr DepthBounds::Range kAnywhere{0, std::numeric_limits<float>::infinity()};
-
 // Rays that are marched through a field together: enough for long blocks of points, few enough for the cache.
 constexpr int kFieldRays = 64;
 
-// The part of a ray inside a box, as distances; empty if far <= near.
-struct Span {
-  double near = 0, far = std::numeric_limits<double>::infinity();
-};
-
-Span clip(const Vec3d& origin, const Vec3d& direction, const Box& box) {
-  Span span;
-  for (int axis = 0; axis != 3; ++axis) {
-    if (direction[axis] == 0) {
-      if (origin[axis] < box.min[axis] || origin[axis] > box.max[axis]) return {0, 0};
-      continue;
-    }
-    const double a = (box.min[axis] - origin[axis]) / direction[axis],
-                 b = (box.max[axis] - origin[axis]) / direction[axis];
-    span.near = std::max(span.near, std::min(a, b));
-    span.far = std::min(span.far, std::max(a, b));
-  }
-  return span;
-}
+}  // namespace
 
 // What is in the way, and nothing of what is seen of it.
-MarchScene withoutLight(MarchScene scene) {
+MarchScene Picture::withoutLight(MarchScene scene) {
   scene.suns.clear();
   scene.locals.clear();
   scene.scattered.clear();
   scene.colour = scene.emission = {};
   return scene;
 }
-
-}  // namespace
 
 Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOptions& options,
                  const Film& film)
@@ -96,193 +73,17 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
   gains_.isGrey = scene_.colours == 1;
 }
 
-void Picture::preparePoints(const Film& film, const Camera* nextCamera) {
-  pointScene_ = withoutLight(scene_);
-  pointScene_.stepDepth = 0.25f;
-  middle_ = camera_.stillAt(0.5);
-  if (film.wantsNormals()) normals_.emplace(*lit_.source);
-  if (film.wantsPositions()) pixelMotion_.emplace(camera_, shutter_, motion_, nextCamera);
-}
-
-bool Picture::centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const {
-  world = middle_->ray(x + 0.5, y + 0.5);
-  const double frames = 0.5 * (shutter_.open + shutter_.close),
-               cosine = dot(world.direction, middle_->forward());
-  const bool isInside =
-      prepare(motion_ ? motion_->toBody(world, frames) : world, kAnywhere, SubSample{}, 0.0, out);
-  out.cosine = float(cosine);
-  if (!meet(world, cosine, isInside, out, hit)) return false;
-  if (holdout_) out.holdout = holdout_->at(x, y);
-  return true;
-}
-
-void Picture::points(const PixelBox& box, Scratch& scratch) const {
-  const std::size_t count = std::size_t(box.width()) * std::size_t(box.height());
-  scratch.points.assign(count, {});
-  std::vector<std::size_t> pixels;
-  std::vector<Ray> world;
-  scratch.rays.resize(count);
-  scratch.hits.resize(count);
-  for (std::size_t i = 0; i != count; ++i) {
-    Ray ray;
-    if (!centreRay(box.x0 + int(i % std::size_t(box.width())), box.y0 + int(i / std::size_t(box.width())),
-                   ray, scratch.rays[pixels.size()], scratch.hits[pixels.size()]))
-      continue;
-    pixels.push_back(i);
-    world.push_back(ray);
-  }
-  const std::size_t live = pixels.size();
-  scratch.results.resize(live);
-  marchAll(pointScene_, live, true, scratch);
-
-  const double frames = 0.5 * (shutter_.open + shutter_.close);
-  std::vector<Vec3f> positions, normals;
-  std::vector<std::size_t> found;
-  for (std::size_t i = 0; i != live; ++i) {
-    const MarchRay& ray = scratch.rays[i];
-    const std::optional<Surfaces::Hit>& hit = scratch.hits[i];
-    if (hit && !hit->isHoldout) {
-      const float at = float(hit->distance) - ray.start;
-      std::size_t cursor = 0;
-      const float left = std::exp(-scratch.results[i].opticalDepth) *
-                         ray.holdout.transmittance(float(hit->distance) * ray.cosine, cursor);
-      std::vector<MarchRecord::Step>& steps = scratch.records[i].steps;
-      steps.push_back({at, at, (steps.empty() ? 0.0f : steps.back().opacity) + left});
-    }
-    const auto distances = opacityDistances(scratch.records[i]);
-    if (!distances) continue;
-    PixelPoint& point = scratch.points[pixels[i]];
-    point.medianDepth = (ray.start + distances->median) * ray.cosine;
-    point.meanDepth = (ray.start + distances->mean) * ray.cosine;
-    if (!pixelMotion_) continue;
-    const Vec3d at = world[i].origin + world[i].direction * double(ray.start + distances->median);
-    const Vec3d inBody = motion_ ? motion_->toBody({at, {}}, frames).origin : at;
-    point.position = Vec3f(at);
-    const bool isObject = hit && !hit->isHoldout && distances->median >= float(hit->distance) - ray.start;
-    pixelMotion_->evaluate(isObject ? at : inBody, point.motion, isObject);
-    if (isObject) {
-      point.normal = hit->normal;
-      continue;
-    }
-    positions.push_back(Vec3f(inBody));
-    found.push_back(pixels[i]);
-  }
-  if (!normals_) return;
-  normals.resize(positions.size());
-  normals_->evaluate(positions, normals);
-  for (std::size_t i = 0; i != found.size(); ++i)
-    scratch.points[found[i]].normal =
-        motion_ ? Vec3f(motion_->toWorld({Vec3d{}, Vec3d(normals[i])}, frames).direction) : normals[i];
-}
-
-// What a camera's ray meets of objects: the march ends there. False if there is neither volume nor object.
-bool Picture::meet(const Ray& world, double cosine, bool isInside, MarchRay& ray,
-                   std::optional<Surfaces::Hit>& hit) const {
-  hit.reset();
-  ray.isCut = false;
-  if (!surfaces_) return isInside;
-  hit = surfaces_->hit(world);
-  if (!hit) return isInside;
-  if (isInside && hit->distance > double(ray.start)) {
-    const float end = float(hit->distance - double(ray.start));
-    ray.isCut = end < ray.length;
-    ray.length = std::min(ray.length, end);
-    return true;
-  }
-  // A march of no length.
-  ray.density = {{}, {1, 0, 0}};
-  ray.start = float(hit->distance);
-  ray.length = 0;
-  ray.cosine = float(cosine);
-  return true;
-}
-
-// What the volume lets through of light from a distance.
-Vec3f Picture::through(const Vec3d& from, const Vec3d& towards, double distance, const Vec3f& shadow) const {
-  const Ray world{from, towards};
-  MarchRay ray;
-  if (!enter(motion_ ? motion_->toBody(world, 0.5 * (shutter_.open + shutter_.close)) : world, kAnywhere,
-             ray) ||
-      double(ray.start) >= distance)
-    return {1, 1, 1};
-  ray.length = std::min(ray.length, float(distance - double(ray.start)));
-  MarchResult result;
-  marchRays(shadowScene_, {&ray, 1}, {&result, 1});
-  Vec3f left;
-  for (int c = 0; c != 3; ++c)
-    left[c] = std::exp(-result.opticalDepth * shadowScene_.extinctionColour[c] * shadow[c]);
-  return left;
-}
-
-// What a white diffuse surface sends back of the light that falls on it.
-Vec3f Picture::lightOn(const Surfaces::Hit& hit, const Vec3d& place, std::size_t sample) const {
-  const Vec3d normal(hit.normal), start = place + normal * surfaces_->clearance();
-  const double infinite = std::numeric_limits<double>::infinity();
-  Vec3f sum;
-  const auto add = [&](const Vec3d& towards, double distance, const Vec3f& irradiance, const Vec3f& shadow) {
-    const double cosine = dot(towards, normal);
-    if (!(cosine > 0) || irradiance == Vec3f{} || surfaces_->occluded({start, towards}, distance)) return;
-    sum += irradiance * through(start, towards, distance, shadow) * float(cosine / kPi);
-  };
-  for (std::size_t i = 0; i != lit_.distant.size(); ++i)
-    add(lit_.directions[i], infinite, lit_.distant[i].irradiance, lit_.distant[i].shadow);
-  for (const LocalLight& light : lit_.lights.locals) {
-    const Vec3d way = Vec3d(light.position) - start, towards = normalize(way);
-    const float r = float(length(way));
-    if (r > 0)
-      add(towards, r, light.intensity * (light.decayAt(r) * light.coneAt(-Vec3f(towards))), light.shadow);
-  }
-  // The sky in directions as frequent as their cosines, which the samples of a pixel share out.
-  const int count = std::max(4, kSkyRays / int(pattern_.size()));
-  const Vec3d across = normalize(std::fabs(normal.x) < 0.5 ? cross(normal, Vec3d{1, 0, 0})
-                                                           : cross(normal, Vec3d{0, 1, 0})),
-              along = cross(normal, across);
-  Vec3f sky;
-  for (int i = 0; i != count; ++i) {
-    // A sunflower's seeds, every sample a share of them from the middle to the rim.
-    const double n = double(sample) + double(pattern_.size()) * i;
-    const double r = std::sqrt((n + 0.5) / (double(pattern_.size()) * count)),
-                 a = 2 * double(kPi) * (0.6180339887498949 * n - std::floor(0.6180339887498949 * n));
-    const Vec3d towards =
-        across * (r * std::cos(a)) + along * (r * std::sin(a)) + normal * std::sqrt(std::max(0.0, 1 - r * r));
-    const Vec3f radiance = lit_.sky ? lit_.sky->radiance(Vec3f(towards)) : lit_.lights.sky;
-    if (radiance == Vec3f{} || surfaces_->occluded({start, towards}, infinite)) continue;
-    sky += radiance * through(start, towards, infinite, {1, 1, 1});
-  }
-  return sum + sky / float(count);
-}
-
-// Adds the object behind a ray's march; returns the share that is seen of it, and its colour times that.
-float Picture::addSurface(const Surfaces::Hit& hit, const MarchRay& ray, const MarchResult& result,
-                          const Ray& world, std::size_t sample, PixelSum& out, Vec3f& colour) const {
-  if (hit.isHoldout) return 0;
-  std::size_t cursor = 0;
-  const float depth = float(hit.distance) * ray.cosine, held = ray.holdout.transmittance(depth, cursor);
-  Vec3f seen;
-  for (int c = 0; c != 3; ++c) seen[c] = held * std::exp(-result.opticalDepth * scene_.extinctionColour[c]);
-  const float opacity = (seen.x + seen.y + seen.z) / 3;
-  if (opacity <= scene_.cutoff) return 0;
-  colour = seen * hit.colour * lightOn(hit, world.origin + world.direction * hit.distance, sample);
-  const float share = 1.0f / float(pattern_.size());
-  out.light[lit_.layers.back() + 1] += colour * share;
-  out.opacity += seen * share;
-  out.alpha += opacity * share;
-  out.albedo += seen * hit.colour * share;
-  if (opacity > 0.005f) out.depth = std::min(out.depth, depth);
-  return opacity;
-}
-
 // `reach`: depths along the line of sight beyond which nothing needs to be looked for.
 bool Picture::enter(const Ray& ray, const DepthBounds::Range& reach, MarchRay& out) const {
-  Span span = field_
-                  ? clip(ray.origin, ray.direction, field_->box())
-                  : clip(lit_.toDensity.point(ray.origin), lit_.toDensity.vector(ray.direction), lit_.bounds);
+  RaySpan span = field_ ? clipped({}, ray.origin, ray.direction, field_->box())
+                        : clipped({}, lit_.toDensity.point(ray.origin), lit_.toDensity.vector(ray.direction),
+                                  lit_.bounds);
   if (reach.near > 0) {
     const double perDepth = 1 / dot(ray.direction, camera_.forward());
     span = {std::max(span.near, double(reach.near) * perDepth),
             std::min(span.far, double(reach.far) * perDepth)};
   }
-  if (!(span.far > span.near)) return false;
+  if (span.isEmpty()) return false;
   const Vec3d entry = ray.origin + ray.direction * span.near;
   out.density = lit_.toDensity.ray(entry, ray.direction);
   out.world = {Vec3f(entry), Vec3f(ray.direction)};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -54,6 +55,9 @@ class Picture {
   void points(const PixelBox& box, Scratch& scratch) const;
 
  private:
+  static constexpr DepthBounds::Range kAnywhere{0, std::numeric_limits<float>::infinity()};
+
+  static MarchScene withoutLight(MarchScene scene);
   void preparePoints(const Film& film, const Camera* nextCamera);
   bool centreRay(int x, int y, Ray& world, MarchRay& out, std::optional<Surfaces::Hit>& hit) const;
   Ray worldRay(int x, int y, const SubSample& sub) const;

@@ -79,18 +79,7 @@ class SourceGrid {
   }
 
   /// Between the target's voxels.
-  float at(const Vec3d& place) const {
-    const Vec3d p = toSource_(place);
-    if (!(std::fabs(p.x) < 1e8 && std::fabs(p.y) < 1e8 && std::fabs(p.z) < 1e8)) return grid_.background();
-    const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
-    const Vec3f f{float(p.x - cell.x), float(p.y - cell.y), float(p.z - cell.z)};
-    const Vec3i brick = brickOf(cell);
-    const std::int32_t pool = grid_.poolIndex(brick);
-    if (grid_.ranges()[std::size_t(pool)].isPoint()) return grid_.ranges()[std::size_t(pool)].min;
-    const float* v =
-        grid_.brick(pool) + sampleOffset(insideBrick(cell.x), insideBrick(cell.y), insideBrick(cell.z));
-    return trilinear(v, f, BrickGrid::kWidth, BrickGrid::kWidth * BrickGrid::kWidth);
-  }
+  float at(const Vec3d& place) const { return sampleGrid(grid_, toSource_(place)); }
 
   /// Whether any value above zero lies in the source's bricks around the voxels low .. high, or may come
   /// there by moving.
