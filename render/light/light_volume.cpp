@@ -34,6 +34,7 @@
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/light_slices.h"
 #include "nephele/render/scene/sub_samples.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
 
@@ -360,14 +361,7 @@ float LightVolume::columnDensity(const Vec3f& world) const {
     return values_[std::size_t(table_[place]) * kVolume + std::size_t((n.z * kWidth + n.y) * kWidth + n.x)];
   };
   const Vec3i at = cell - brick * kBrick;
-  const Vec3f f = p - Vec3f(cell);
-  float sum = 0;
-  for (int corner = 0; corner != 8; ++corner) {
-    const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
-    const float weight = (dx ? f.x : 1 - f.x) * (dy ? f.y : 1 - f.y) * (dz ? f.z : 1 - f.z);
-    sum += weight * node(at + Vec3i{dx, dy, dz});
-  }
-  return sum;
+  return trilinear(p - Vec3f(cell), [&](int x, int y, int z) { return node(at + Vec3i{x, y, z}); });
 }
 
 double LightVolume::estimateBytes(const RenderVolume& volume) {

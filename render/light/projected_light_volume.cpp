@@ -25,6 +25,7 @@
 #include "nephele/render/light/detail/light_slices.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/scene/sub_samples.h"
+#include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
 
@@ -370,20 +371,8 @@ float ProjectedLightVolume::columnDensity(const Vec3f& world) const {
     brick[axis] = brickOf(cell[axis]) - face->firstBrick[axis];
     if (brick[axis] < 0 || brick[axis] >= face->brickCount[axis]) return 0.0f;
   }
-  const auto pool = std::size_t(
-      face->table[(std::size_t(brick.z) * std::size_t(face->brickCount.y) + std::size_t(brick.y)) *
-                      std::size_t(face->brickCount.x) +
-                  std::size_t(brick.x)]);
-  const Vec3f f = p - Vec3f(cell);
-  float sum = 0;
-  for (int corner = 0; corner != 8; ++corner) {
-    const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
-    const float weight = (dx ? f.x : 1 - f.x) * (dy ? f.y : 1 - f.y) * (dz ? f.z : 1 - f.z);
-    const int at =
-        ((insideBrick(cell.z) + dz) * kWidth + insideBrick(cell.y) + dy) * kWidth + insideBrick(cell.x) + dx;
-    sum += weight * face->values[pool * LightVolume::kVolume + std::size_t(at)];
-  }
-  return sum;
+  return BrickSampler<kWidth, 0>{face->values.data(), face->table.data(),
+                                 face->brickCount}(p - Vec3f(face->firstBrick * LightVolume::kBrick));
 }
 
 std::size_t ProjectedLightVolume::memoryBytes() const {
