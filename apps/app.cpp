@@ -130,6 +130,16 @@ void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
     refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
 }
 
+/// After "--" all arguments are files, also where they begin with a dash.
+std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments) {
+  const auto mark = std::find(arguments.begin(), arguments.end(), "--");
+  if (mark == arguments.end()) return arguments;
+  for (auto file = mark + 1; file != arguments.end(); ++file)
+    if (file->starts_with('-')) file->insert(0, "./");
+  arguments.erase(mark);
+  return arguments;
+}
+
 int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::string& commandLine) {
   CLI::App app(verb.summary, "nephele " + verb.name);
   app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
@@ -142,7 +152,7 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
 
   const std::string who = "nephele " + verb.name;
   try {
-    arguments = withConfigFile(app, std::move(arguments));
+    arguments = withConfigFile(app, withFilesAfterDashes(std::move(arguments)));
     for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
     std::reverse(arguments.begin(), arguments.end());
     app.parse(std::move(arguments));

@@ -258,8 +258,10 @@ void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const 
     const SubProgress part(progress, double(step) / (options.steps + 1),
                            double(step + 1) / (options.steps + 1));
     map = advanced(map, *matter, velocity(step), options.dt, part);
+    progress.check();
     AdvectionStep report{.bricks = map.bricks.size(), .memoryBytes = map.memoryBytes()};
     report.foldedShare = foldedShare(map, *matter);
+    progress.check();
     if (options.rebakeShare && report.foldedShare > *options.rebakeShare && step + 1 < options.steps) {
       bake(part);
       matter = std::make_unique<Matter>(result.grids, lattice);

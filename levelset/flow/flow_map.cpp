@@ -207,7 +207,9 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
   const Lattice& lattice = map.lattice;
   const VectorField back = traceBack(velocity, {.dt = dt});
   const std::vector<Vec3i> before = matterBricks(map, matter);
+  progress.check();
   detail::requireShortSteps(before, lattice, velocity, dt, kLongestStep);
+  progress.check();
   const std::vector<Vec3i> seeds =
       detail::flowSeeds(before, lattice, lattice, traceBack(velocity, {.dt = -dt}), kLongestStep);
   const KeptBricks kept(map);
@@ -238,6 +240,7 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
   };
   const detail::GrownBricks grown =
       detail::growBricks(seeds, {.components = 3, .withNeighbours = true}, evaluate, progress);
+  progress.check();
   const float zero[3] = {};
   const auto grids = detail::assembleGrids(grown, lattice, zero, detail::Beyond::nearest);
   FlowMap result{lattice, {grids[0], grids[1], grids[2]}, grown.bricks};

@@ -108,6 +108,9 @@ OutputFile::OutputFile(std::string path)
   std::error_code ignored;
   require(!fs::is_symlink(target_, ignored) || isStream_,
           fmt::format("cannot write {}: its symbolic links lead round in a circle", path_));
+  std::error_code fault;
+  const fs::file_type type = fs::status(target, fault).type();
+  require(type != fs::file_type::none, fmt::format("cannot write {}: {}", path_, fault.message()));
   require(target.has_filename() && !fs::is_directory(target, ignored),
           fmt::format("cannot write {}: it is a folder", path_));
   require(fs::exists(folder, ignored),
@@ -115,10 +118,13 @@ OutputFile::OutputFile(std::string path)
   require(fs::is_directory(folder, ignored),
           fmt::format("cannot write {}: {} is not a folder", path_, folder.string()));
 
+  // A temporary has a number more than the name, which may be as long as the system allows.
+  constexpr std::size_t kMostOfName = 100;
+  const std::string extension = target.extension().string();
   static std::atomic<unsigned> serial{0};
   for (int attempt = 0; attempt < 1000; ++attempt) {
-    const std::string name = fmt::format(".{}.{}-{}{}", target.stem().string().substr(0, 100), ::getpid(),
-                                         serial++, target.extension().string());
+    const std::string name = fmt::format(".{}.{}-{}{}", target.stem().string().substr(0, kMostOfName),
+                                         ::getpid(), serial++, extension.substr(0, kMostOfName));
     temporary_ = (folder / name).string();
     entry_ = enlist(temporary_);
     const int descriptor = ::open(temporary_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);

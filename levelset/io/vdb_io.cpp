@@ -52,8 +52,13 @@ auto translateReadErrors(const std::string& path, const Body& body) {
     failReading(path, reason.starts_with(path + ": ") ? reason.substr(path.size() + 2) : reason);
   } catch (const std::bad_alloc&) {
     failReading(path, "damaged, or too large for the memory of this machine");
-  } catch (const std::exception& e) {
-    failReading(path, e.what());
+  } catch (const openvdb::Exception& e) {
+    // "IoError: what happened"
+    const std::string reason = e.what();
+    const std::size_t colon = reason.find("Error: ");
+    failReading(path, colon == std::string::npos ? reason : reason.substr(colon + 7));
+  } catch (const std::exception&) {
+    failReading(path, "is damaged: it cannot be read");
   }
 }
 
@@ -160,10 +165,10 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
     file.close();
     // OpenVDB does not look whether its stream failed: what it wrote must hold what it announces.
     detail::readOpenVdb(output.temporaryPath(), [](const auto&, const auto&) { return false; });
-  } catch (const Error&) {
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
     throw Error(fmt::format("{}: cannot be written whole; the disk may be full", path));
-  } catch (const std::exception& e) {
-    throw Error(fmt::format("{}: cannot be written: {}", path, e.what()));
   }
   output.commit();
 }

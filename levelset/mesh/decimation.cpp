@@ -46,6 +46,8 @@ constexpr double kTurn = 0.3;
 constexpr double kThin = 0.03;
 // Share of its length that an edge costs on top of the distance, so that flat places lose short edges first.
 constexpr double kLengthCost = 1e-3;
+// Turns between two looks at whether all is cancelled; late ones measure thousands of points each.
+constexpr std::size_t kTurnsUnheard = 64;
 // What measured distances may be of the bound, which leaves room for what lies between the points measured.
 constexpr double kAllowance = 0.75;
 
@@ -68,11 +70,13 @@ class Decimation {
   }
 
   void run(std::size_t target, const Progress& progress) {
-    for (const Vertex v : mesh_.vertices())
+    for (const Vertex v : mesh_.vertices()) {
+      if (std::size_t(v.idx()) % kTurnsUnheard == 0) progress.check();
       if (!mesh_.is_isolated(v)) queue(v, evaluate(v));
+    }
     const auto before = double(faceCount_);
     for (std::size_t step = 0; faceCount_ > target && !queue_.empty(); ++step) {
-      if (step % 1024 == 0) {
+      if (step % kTurnsUnheard == 0) {
         progress.check();
         progress.advance((before - double(faceCount_)) / std::max(before - double(target), 1.0));
       }
@@ -427,6 +431,7 @@ DecimatedMesh decimate(const Mesh& mesh, const DecimationOptions& options, const
   const Mesh welded = detail::weldedTriangles(mesh);
   require(welded.faceCount() > 0, "decimation: all faces repeat a corner");
   progress.begin("decimate");
+  progress.check();
   Decimation decimation(welded, kAllowance * kAllowance * bound * bound);
   decimation.run(target, progress);
   return decimation.result();

@@ -31,7 +31,8 @@ namespace nephele::detail {
 namespace {
 
 constexpr int kBrick = BrickGrid::kBrick;
-constexpr std::size_t kGrain = 1024;
+/// Few enough for cancelling to be heard where each triangle matters to thousands of bricks, and the reverse.
+constexpr std::size_t kTriangleGrain = 128, kBrickGrain = 4;
 /// Excess over 1 voxel of two distances of opposite sign that rounding explains.
 constexpr float kSignTolerance = 0.01f;
 
@@ -46,7 +47,7 @@ class BrickLists {
     shapes_.resize(surface.triangleCount());
     std::vector<std::atomic<std::uint32_t>> counts(bricks_.size() + 1);
     parallelFor(
-        surface.triangleCount(), kGrain,
+        surface.triangleCount(), kTriangleGrain,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t t = begin; t < end; ++t) {
             shapes_[t] = triangleShape(corner(t, 0), corner(t, 1), corner(t, 2));
@@ -62,7 +63,7 @@ class BrickLists {
     triangles_.resize(sum);
     for (auto& c : counts) c.store(0, std::memory_order_relaxed);
     parallelFor(
-        surface.triangleCount(), kGrain,
+        surface.triangleCount(), kTriangleGrain,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t t = begin; t < end; ++t)
             forEachBrick(t, [&](std::size_t brick) {
@@ -311,7 +312,7 @@ std::optional<VoxelGrid<float>> signedBand(const SurfaceGeometry& surface, const
   std::vector<BlockState> states(bricks.size());
   std::atomic<bool> contradiction{false};
   parallelFor(
-      bricks.size(), 32,
+      bricks.size(), kBrickGrain,
       [&](std::size_t begin, std::size_t end) {
         std::vector<PlacedTriangle> placed;
         for (std::size_t i = begin; i < end && !contradiction; ++i) {

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <set>
+#include <system_error>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/exr_io.h"
@@ -28,7 +30,10 @@ void requireSize(const std::string& path, long long width, long long height, lon
 namespace {
 
 void readFile(const std::string& path, const ImageReader& reader) {
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
+  if (!file.is_open())
+    throw Error(fmt::format("{}: cannot be read: {}", path, std::generic_category().message(errno)));
   std::array<unsigned char, 12> start{};
   if (!file.read(reinterpret_cast<char*>(start.data()), 4)) throw Error(path + ": cannot be read");
   file.read(reinterpret_cast<char*>(start.data()) + 4, 8);

@@ -68,7 +68,10 @@ PieceFolder::PieceFolder(std::string path) : path_(std::move(path)) {
   std::error_code error;
   fs::path folder = fs::absolute(path_).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
-  if (fs::symlink_status(folder, error).type() != fs::file_type::not_found) {
+  const fs::file_status status = fs::symlink_status(folder, error);
+  require(status.type() != fs::file_type::none,
+          fmt::format("cannot make the folder {}: {}", path_, error.message()));
+  if (fs::exists(status)) {
     require(fs::is_directory(folder, error),
             fmt::format("cannot write pieces to {}: it is no folder", path_));
     if (fs::exists(pathOf(kList), error)) listed_ = filesListed(pathOf(kList));

@@ -64,8 +64,11 @@ Mesh wrapped(const Mesh& triangles, double alpha, double offset, const Progress&
                        CGAL::parameters::visitor(std::ref(visitor)));
   } catch (const Cancelled&) {
     throw;
-  } catch (const std::exception& error) {
-    throw Error(std::string("mesh repair: alpha wrapping failed: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    throw Error(
+        "mesh repair: the mesh could not be wrapped: its triangles are too fine for their coordinates");
   }
   Mesh result;
   for (const auto vertex : wrap.vertices()) {

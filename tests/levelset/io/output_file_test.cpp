@@ -160,6 +160,22 @@ TEST(OutputFile, UnwritableFolderIsRefused) {
   EXPECT_NE(message.find("Permission denied"), std::string::npos) << message;
 }
 
+// 255 bytes are the longest name there is.
+TEST(OutputFile, NamesMayBeAsLongAsTheSystemAllows) {
+  const TemporaryFolder folder;
+  std::string stem(255, 'n'), extension(255, 'e');
+  stem.replace(251, 4, ".vdb");
+  extension.replace(0, 2, "a.");
+  for (const std::string* name : {&stem, &extension}) {
+    OutputFile output(folder.file(*name));
+    write(output.temporaryPath(), "text");
+    output.commit();
+    EXPECT_EQ(textOf(folder.file(*name)), "text");
+  }
+  EXPECT_NE(messageOf([&] { OutputFile output(folder.file(std::string(256, 'n'))); }).find("too long"),
+            std::string::npos);
+}
+
 TEST(OutputFile, DiscardingRemovesEveryOpenTemporaryButNoFinishedFile) {
   const TemporaryFolder folder;
   OutputFile finished(folder.file("a.obj"));
