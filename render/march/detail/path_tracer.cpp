@@ -113,7 +113,6 @@ void PathTracer::trace(const PixelBox& tile, Wave& wave, std::vector<PathSums>& 
   sums.assign(width * std::size_t(tile.height()), {});
   for (PathSums& sum : sums) sum.light.resize(layers_);
   for (std::size_t begin = 0; begin < count; begin += together) {
-    progress_.check();
     const std::size_t end = std::min(begin + together, count);
     wave.paths.resize(end - begin);
     wave.light.assign(wave.paths.size() * layers_, {});
@@ -135,6 +134,7 @@ void PathTracer::follow(Wave& wave) const {
   wave.live.resize(wave.paths.size());
   for (std::size_t i = 0; i != wave.live.size(); ++i) wave.live[i] = std::uint32_t(i);
   while (!wave.live.empty()) {
+    progress_.check();
     wave.hits.resize(wave.live.size());
     wave.flights.resize(wave.live.size());
     for (std::size_t i = 0; i != wave.live.size(); ++i)

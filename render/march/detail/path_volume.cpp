@@ -20,12 +20,10 @@ namespace nephele::detail {
 
 namespace {
 
-// Below this, transmittances play Russian roulette.
-constexpr float kLeastTransmittance = 0.1f;
 // Larger optical depths of a voxel count as this: nothing of them is seen but their surface.
 constexpr float kMostDepth = 1e4f;
 // From this optical depth of a voxel on it is worth while to look at each.
-constexpr float kOpaque = 2.0f;
+constexpr float kOpaque = 3.0f;
 // From a sample of a brick to the next one along y and z.
 constexpr int kRow = BrickGrid::kWidth, kPlane = kRow * kRow;
 
@@ -151,14 +149,6 @@ void PathVolume::collide(const Part& part, PathRandom& random, RateOf&& rateOf, 
   });
 }
 
-Interval PathVolume::boundsOf(const Interval& range) const {
-  return {std::clamp(range.min, 0.0f, mostDensity_), std::clamp(range.max, 0.0f, mostDensity_)};
-}
-
-float PathVolume::densityAt(const Vec3f& p) const {
-  return std::clamp(density_(p), 0.0f, mostDensity_);
-}
-
 Vec3f PathVolume::albedoAt(const Vec3d& place) const {
   if (!scene_.colour.table) return albedo_;
   const Vec3f p(toLattice_.point(place));
@@ -235,15 +225,9 @@ void PathVolume::flyInColours(const Part& part, Flight& flight) const {
       [](float, const Interval&) { return true; });
 }
 
-// How much of the largest density above the least one a density is.
-float PathVolume::residualOf(float density, const Interval& range) {
-  return std::clamp((density - range.min) / (range.max - range.min), 0.0f, 1.0f);
-}
-
-// Russian roulette where little is left; false where that is nothing.
-bool PathVolume::isWorthwhile(ShadowWay& way) {
+// Russian roulette; false where nothing is left.
+bool PathVolume::survives(ShadowWay& way) {
   const float most = largest(way.left);
-  if (most >= kLeastTransmittance) return true;
   if (way.random.next() * kLeastTransmittance >= most) {
     way.left = {};
     return false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <span>
@@ -107,15 +108,25 @@ class PathVolume {
   void fly(Flight& flight) const;
   void flyInColours(const Part& part, Flight& flight) const;
   void look(ShadowWay& way) const;
-  float densityAt(const Vec3f& p) const;
-  Interval boundsOf(const Interval& range) const;
+  float densityAt(const Vec3f& p) const { return std::clamp(density_(p), 0.0f, mostDensity_); }
+  Interval boundsOf(const Interval& range) const {
+    return {std::clamp(range.min, 0.0f, mostDensity_), std::clamp(range.max, 0.0f, mostDensity_)};
+  }
 
   // A tentative collision is real by a chance that lies between those of the colours, by their weights, and
   // each weight makes up for it (spectral tracking, Kutz, Habel, Li and Novak 2017). `real`: how likely it is
   // to each of them.
   static bool isReal(Flight& flight, const Vec3f& real, double distance);
-  static float residualOf(float density, const Interval& range);
-  static bool isWorthwhile(ShadowWay& way);
+  // How much of the largest density above the least one a density is.
+  static float residualOf(float density, const Interval& range) {
+    return std::clamp((density - range.min) / (range.max - range.min), 0.0f, 1.0f);
+  }
+  // Below this, transmittances play Russian roulette.
+  static constexpr float kLeastTransmittance = 0.1f;
+  static bool isWorthwhile(ShadowWay& way) {
+    return std::max({way.left.x, way.left.y, way.left.z}) >= kLeastTransmittance || survives(way);
+  }
+  static bool survives(ShadowWay& way);
   static void dim(ShadowWay& way, float depth);
 
   void follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,

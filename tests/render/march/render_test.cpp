@@ -58,5 +58,59 @@ TEST(Render, ShowsEveryPixelOnceWhenItIsDone) {
     }
 }
 
+// Paints every pixel with where it is.
+class Painter final : public Integrator {
+ public:
+  class Worker final : public TileWorker {
+   public:
+    void integrate(const PixelBox& tile, Film& film) override {
+      for (int y = tile.y0; y != tile.y1; ++y)
+        for (int x = tile.x0; x != tile.x1; ++x) {
+          PixelSum pixel;
+          pixel.alpha = float(x);
+          pixel.emission = {float(x), float(y), 0};
+          film.set(film.placeOf(x, y), pixel);
+          ++rays;
+        }
+    }
+    void findPoints(const PixelBox&, Film&) override {}
+  };
+
+  const char* stage() const override { return "paint"; }
+  int tileSize() const override { return 7; }
+  int raysPerPixel() const override { return 1; }
+  bool prepare(const RenderScene&, const Film&, const Progress&) override { return true; }
+  std::unique_ptr<TileWorker> worker() const override { return std::make_unique<Worker>(); }
+};
+
+TEST(Render, TellsAnIntegratorWhereItsPixelsAre) {
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  Camera::Frame frame{45, 37, 30};
+  frame.crop = PixelBox{7, 5, 40, 30};
+  const Camera camera = Camera::framing(volume.outline(), 20, 10, frame);
+  const Medium medium{10.0f};
+  FrameOptions options;
+  const RenderScene scene(volume, medium, kLights, camera, options);
+  Painter painter;
+  const RenderResult result = render(scene, painter, Film(scene, options));
+  ASSERT_EQ(result.image.width, 33);
+  for (int y = 0; y != 25; ++y)
+    for (int x = 0; x != 33; ++x) {
+      EXPECT_EQ(result.image.at("R", x, y), float(x + 7));
+      EXPECT_EQ(result.image.at("G", x, y), float(y + 5));
+    }
+  EXPECT_EQ(result.rays, 33u * 25u);
+}
+
+TEST(Render, StopsWhenItIsCancelled) {
+  struct Stopped : Progress {
+    bool cancelled() const override { return true; }
+  };
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Camera camera = Camera::framing(volume.outline(), 20, 10, {45, 37, 30});
+  EXPECT_THROW(renderImage(volume, {}, kLights, camera, {}, Stopped()), Cancelled);
+  EXPECT_THROW(pathTraceImage(volume, {}, kLights, camera, {}, Stopped()), Cancelled);
+}
+
 }  // namespace
 }  // namespace nephele
