@@ -168,6 +168,42 @@ TEST(PathScene, DeepPicturesHoldTheOpacityInFrontOfEveryDepth) {
   EXPECT_LT(result.deep->sampleCount(), 200u);
 }
 
+TEST(PathScene, WhatGlowsInColoursBehindAHoldoutIsAsMarched) {
+  // A slab that glows and differs in extinction between colours, with a pane that lets half through in its
+  // middle. Nothing scatters, so both are means of the same; five standard errors of 256 pixels, and half a
+  // percent for the marcher's steps across the pane.
+  const auto grid = slab(2.1f, 3, 0.1f);
+  const auto glow = std::make_shared<BrickGrid>(*grid);
+  glow->multiply(0.5f);
+  const RenderVolume volume(grid, {{}, {glow, glow, glow}});
+  Medium coloured = medium(1, 0);
+  coloured.extinctionColour = {1, 0.5f, 0.25f};
+  const Camera camera = needle(16);
+  PathOptions tracing;
+  tracing.samplesPerPixel = 200;
+  tracing.deep.emplace();
+  tracing.aovs = {"transmittance", "emission"};
+  tracing.holdout = std::make_shared<const Holdout>(
+      DeepImage{16, 16, {}, std::vector<std::vector<DeepSample>>(256, {{9, 9, 0.5f, {}}})});
+  RenderOptions marching;
+  static_cast<FrameOptions&>(marching) = tracing;
+  marching.octaves.count = 1;
+  marching.step = 0.01f;
+  const Image marched = renderImage(volume, coloured, {}, camera, marching).image;
+  const RenderResult traced = pathTraceImage(volume, coloured, {}, camera, tracing);
+  for (const char* name :
+       {"A", "emission.R", "emission.B", "transmittance.R", "transmittance.G", "transmittance.B"}) {
+    const Estimate expected = estimate(marched, name), found = estimate(traced.image, name);
+    EXPECT_NEAR(found.mean, expected.mean, 5 * found.standardError + 0.005 * expected.mean) << name;
+    EXPECT_LT(found.standardError, 0.01 * expected.mean) << name;
+  }
+  for (int x = 0; x != 16; ++x) {
+    const FlatPixel flat = flattened(traced.deep->at(x, 3));
+    EXPECT_NEAR(flat.alpha, traced.image.at("A", x, 3), 5e-4f);
+    EXPECT_NEAR(flat.colour.y, traced.image.at("G", x, 3), 1e-3f);
+  }
+}
+
 TEST(PathScene, ShadowMapsAreLookedUpWithoutBias) {
   const RenderVolume volume(lumpyCloud());
   const Camera camera = Camera::framing(volume.outline(), 25, 15, {32, 24, 35});
