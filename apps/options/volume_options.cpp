@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/volume/volume_parts.h"
 
@@ -138,6 +139,8 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   std::vector<VolumePart> parts;
   for (std::size_t i = 0; i != paths.size(); ++i)
     namingFile(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
+  // Trees of files are many small parts.
+  detail::releaseFreed();
   run.requireMemory(estimateCombinedBytes(parts), "make the volumes with larger voxels");
   if (paths.size() > 1) return combine(parts, run);
   std::optional<RenderVolume> only;

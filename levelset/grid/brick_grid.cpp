@@ -46,6 +46,12 @@ void BrickGrid::reserve(std::size_t bricks) {
 }
 
 std::int32_t BrickGrid::append(std::size_t bricks) {
+  const std::int32_t first = appendUnset(bricks);
+  std::fill(values_.begin() + std::ptrdiff_t(first) * kVolume, values_.end(), 0.0f);
+  return first;
+}
+
+std::int32_t BrickGrid::appendUnset(std::size_t bricks) {
   const std::size_t count = (poolSize() + bricks) * kVolume;
   requirePool(poolSize() + bricks);
   if (values_.capacity() < count)

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "nephele/levelset/grid/brick_layout.h"
+#include "nephele/levelset/grid/large_buffer.h"
 
 namespace nephele {
 
@@ -25,6 +26,8 @@ class BrickGrid : public BrickLayout {
   /// Adds bricks, all samples 0, and returns the number of the first. @throws Error if there are more than
   /// can be numbered.
   std::int32_t append(std::size_t bricks);
+  /// The same with samples that are not set, nor are their ranges.
+  std::int32_t appendUnset(std::size_t bricks);
   /// Adds a brick of one value and returns its number.
   std::int32_t appendConstant(float value);
 
@@ -32,7 +35,7 @@ class BrickGrid : public BrickLayout {
   /// To be written. Its range does not follow: see setRange and fillBorders.
   float* brick(std::int32_t pool) { return values_.data() + std::size_t(pool) * kVolume; }
   /// The samples of all bricks, one after the other.
-  const std::vector<float>& values() const { return values_; }
+  const detail::UnsetVector<float>& values() const { return values_; }
   /// The sample at voxel (i, j, k). Slow; for tests and conversion.
   float at(const Vec3i& voxel) const;
   /// Multiplies all samples and the background.
@@ -43,7 +46,7 @@ class BrickGrid : public BrickLayout {
  private:
   friend class PackedGrid;
 
-  std::vector<float> values_;
+  detail::UnsetVector<float> values_;
 };
 
 /// Copies the shared border samples of all bricks from their neighbours' own samples and recomputes the

@@ -1,10 +1,35 @@
 #pragma once
 
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "nephele/modeling/base/system.h"
 
 namespace nephele::detail {
+
+/// Leaves plain values unset where a vector grows by `resize(count)`, so that threads touch its pages first
+/// that then write them.
+template <class T>
+struct UnsetAllocator : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnsetAllocator<U>;
+  };
+  using std::allocator<T>::allocator;
+
+  template <class U>
+  void construct(U* place) {
+    ::new (static_cast<void*>(place)) U;
+  }
+  template <class U, class... Arguments>
+  void construct(U* place, Arguments&&... arguments) {
+    std::construct_at(place, std::forward<Arguments>(arguments)...);
+  }
+};
+
+template <class T>
+using UnsetVector = std::vector<T, UnsetAllocator<T>>;
 
 /// Asks for huge pages where values have not been touched yet: first touch then costs a fifth.
 template <class T>
@@ -13,15 +38,15 @@ void useHugePages(T* first, T* last) {
 }
 
 /// Makes room in a large vector of plain values, on huge pages where the system offers them.
-template <class T>
-void reserveLarge(std::vector<T>& values, std::size_t count) {
+template <class Vector>
+void reserveLarge(Vector& values, std::size_t count) {
   values.reserve(count);
   useHugePages(values.data(), values.data() + values.capacity());
 }
 
 /// Grows a large vector of plain values on huge pages.
-template <class T>
-void resizeLarge(std::vector<T>& values, std::size_t count) {
+template <class Vector>
+void resizeLarge(Vector& values, std::size_t count) {
   reserveLarge(values, count);
   values.resize(count);
 }

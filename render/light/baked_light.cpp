@@ -6,11 +6,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "nephele/render/light/deep_shadow.h"
 #include "nephele/render/volume/finer_density.h"
 
 namespace nephele::detail {
+
+namespace {
+
+// Of Legendre's moments of a phase function but the 0th, the largest.
+float largestMoment(const Phase& phase) {
+  constexpr int kSteps = 512, kMoments = 4;
+  double sums[kMoments + 1] = {};
+  for (int i = 0; i != kSteps; ++i) {
+    const double angle = double(kPi) * (i + 0.5) / kSteps, x = std::cos(angle);
+    const double share = 2 * double(kPi) * std::sin(angle) * double(kPi) / kSteps * double(phase(float(x)));
+    double before = 1, here = x;
+    for (int n = 1; n <= kMoments; ++n) {
+      sums[n] += share * here;
+      const double next = ((2 * n + 1) * x * here - n * before) / (n + 1);
+      before = here;
+      here = next;
+    }
+  }
+  double largest = 0;
+  for (const double sum : sums) largest = std::max(largest, std::fabs(sum));
+  return float(std::min(largest, 1.0));
+}
+
+}  // namespace
 
 BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
                        const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
@@ -46,7 +71,8 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   suns.reserve(distant.size());
   for (const DistantLight& sun : distant) {
     progress.begin("light " + sun.name);
-    LightVolume& light = suns.emplace_back(shading, sun.direction, progress);
+    LightVolume& light =
+        suns.emplace_back(shading, sun.direction, LightVolume::Options{darkColumn(sun.shadow)}, progress);
     shadowDeeply(volume, sun, light, progress);
     if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
     scene.suns.push_back(
@@ -84,6 +110,18 @@ float BakedLight::columnPerDepth(const Vec3f& shadow) const {
   for (int c = 0; c != 3; ++c)
     if (const float share = shadow[c] * scene.extinctionColour[c]; share > 0) least = std::min(least, share);
   return 1 / (scene.extinction * std::max(least, 0.01f));
+}
+
+// Behind which no part of a sun's light is seen, e^-12 of it, in no colour: what goes straight on counts in
+// part as light that has not met anything, so that the slowest part of it is stopped by a share of the
+// extinction.
+float BakedLight::darkColumn(const Vec3f& shadow) const {
+  constexpr float kDarkDepth = 12;
+  const float albedo = std::max({meanAlbedo.x, meanAlbedo.y, meanAlbedo.z});
+  float least = 1;
+  for (int c = 0; c != 3; ++c) least = std::min(least, shadow[c] * scene.extinctionColour[c]);
+  const float seen = scene.extinction * least * (1 - albedo * largestMoment(medium.phase));
+  return seen > 0 ? kDarkDepth / seen : std::numeric_limits<float>::infinity();
 }
 
 // Fills the columns of a light from its deep shadow map, if it has one.

@@ -62,6 +62,7 @@ struct BakedLight {
 
  private:
   float columnPerDepth(const Vec3f& shadow) const;
+  float darkColumn(const Vec3f& shadow) const;
   template <class Light, class Columns>
   void shadowDeeply(const RenderVolume& volume, const Light& light, Columns& columns,
                     const Progress& progress) const;

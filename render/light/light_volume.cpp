@@ -20,9 +20,14 @@
 // hold, since nothing is seen in an empty one, and a third more: at an edge, where cells differ, a mean
 // leaves the first cell a third of its error.
 //
+// Columns only grow. What a brick adds at least follows from its smallest density, so that bricks which lie
+// in the dark as a whole are known before the sweep: in a thick cloud most of them.
+//
 // Limits: the column is resolved at the density's own spacing; structure finer than a voxel does not exist
 // there.
 #include "nephele/render/light/light_volume.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -33,12 +38,14 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/light_slices.h"
-#include "nephele/render/scene/sub_samples.h"
 #include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
 
 namespace {
+
+// In the table, until bricks are numbered.
+constexpr std::int32_t kReached = 1, kDarkBrick = -1;
 
 constexpr int kN = LightVolume::kWidth;    // nodes across a brick
 constexpr int kPatch = kN + 5;             // density samples around a brick's slice, half a slice up and down
@@ -122,6 +129,28 @@ struct LightVolume::Sweep {
     return !patch.empty;
   }
 
+  // What any node of a brick of the lattice adds to its column at least, its first nodes at (u0, v0).
+  float leastColumn(int u0, int v0, int bw) const {
+    // Mixes of four samples by four weigh some of them below 0: by 0.28 in all, see `weights`.
+    constexpr float kBelow = 0.28125f;
+    const float k0 = float(bw * BrickGrid::kBrick), k1 = k0 + float(BrickGrid::kBrick);
+    const auto bricksOf = [&](int first, float slope) {
+      const float low = std::min(slope * k0, slope * k1), high = std::max(slope * k0, slope * k1);
+      return std::array{brickOf(first + int(std::floor(low)) - 2),
+                        brickOf(first + kN + int(std::ceil(high)) + 2)};
+    };
+    const auto [firstU, lastU] = bricksOf(u0, slopeU);
+    const auto [firstV, lastV] = bricksOf(v0, slopeV);
+    float least = INFINITY, most = 0;
+    for (int bv = firstV; bv <= lastV; ++bv)
+      for (int bu = firstU; bu <= lastU; ++bu) {
+        const Interval& range = grid.ranges()[std::size_t(grid.poolIndex(bricks(bu, bv, bw)))];
+        least = std::min(least, range.min);
+        most = std::max(most, range.max);
+      }
+    return std::max(least - kBelow * (most - least), 0.0f) * step * float(BrickGrid::kBrick);
+  }
+
   // What four samples in a row count for at the place f between the middle two: linear interpolation, less
   // what it overestimates on average, f (1 - f) / 2 times the second difference.
   static std::array<float, 4> weights(float f) {
@@ -144,7 +173,10 @@ struct LightVolume::Sweep {
   }
 };
 
-LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress) {
+LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const Options& options,
+                         const Progress& progress)
+    : dark_(options.dark) {
+  require(options.dark > 0, fmt::format("light: expected a dark column above 0, got {}", options.dark));
   require(isFinite(towards) && length(towards) > 0,
           "light: the direction towards it must be finite and not zero");
   const BrickGrid& grid = volume.density();
@@ -195,11 +227,37 @@ void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
     for (int j = first.y; j <= last.y; ++j)
       for (int i = first.x; i <= last.x; ++i)
         table_[(std::size_t(first.z - low.z) * brickCount_.y + std::size_t(j - low.y)) * brickCount_.x +
-               std::size_t(i - low.x)] = 1;
-  std::int32_t pool = 0;
+               std::size_t(i - low.x)] = kReached;
+  const bool hasDark = dark_ < INFINITY;
+  if (hasDark) findDark(sweep);
+  std::int32_t next = hasDark ? 2 : 1;
   for (std::int32_t& brick : table_)
-    if (brick) brick = ++pool;
-  detail::resizeLarge(values_, std::size_t(pool + 1) * kVolume);
+    if (brick != 0) brick = brick == kDarkBrick ? 1 : next++;
+  values_ = {};
+  detail::resizeLarge(values_, std::size_t(next) * kVolume);
+  std::fill_n(values_.begin(), kVolume, 0.0f);
+  if (hasDark) std::fill_n(values_.begin() + kVolume, kVolume, dark_);
+}
+
+// Marks what lies behind so much density, by the smallest of every brick, that it is dark.
+void LightVolume::findDark(const Sweep& sweep) {
+  const auto across = std::size_t(brickCount_.x) * std::size_t(brickCount_.y);
+  parallelFor(across, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column != end; ++column) {
+      float sum = 0;
+      for (int n = 0; n != brickCount_.z; ++n) {
+        const int w = sweep.fromAbove ? brickCount_.z - 1 - n : n;
+        std::int32_t& entry = table_[std::size_t(w) * across + column];
+        if (entry == 0) continue;
+        if (sum > dark_)
+          entry = kDarkBrick;
+        else
+          sum += sweep.leastColumn((firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick,
+                                   (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick,
+                                   firstBrick_.z + w);
+      }
+    }
+  });
 }
 
 // Sums the density down one column of bricks, from the light on.
@@ -209,14 +267,17 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
   const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick;
   const int down = sweep.fromAbove ? -1 : 1;
   const auto poolAt = [&](int n) {
-    return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
+    const std::int32_t pool =
+        table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
+    return isStored(pool) ? pool : 0;
   };
   detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
   detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
   Patch patches[2];
   Patch *here = &patches[0], *next = &patches[1];
   detail::forEachFilledRun(brickCount_.z, poolAt, [&](int n, int end) {
-    // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density.
+    // Slices of the bricks n .. end - 1, counted from the light. Outside of such a run there is no density,
+    // or no light.
     const int slices = (end - n) * kBrick;
     int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
     at.before->fill(0.0f);
@@ -255,91 +316,6 @@ void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const
   const int slice = sweep.fromAbove ? kBrick - inside : inside;
   float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
   detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, out);
-}
-
-void detail::ColumnShade::addTo(float* values, int slice, float perDepth) const {
-  // By how many of the four points are hidden.
-  const float added[5] = {0, 0.28768207f * perDepth, 0.69314718f * perDepth, 1.38629436f * perDepth,
-                          kDark * perDepth};
-  const float sign = falls ? -1.0f : 1.0f;
-  for (int k = 0; k != LightVolume::kWidth; ++k)
-    for (const std::array<float, 4>& from : begins) {
-      int hidden = 0;
-      for (std::size_t p = 0; p != 4; ++p)
-        hidden += sign * (float(slice + k) + kQuarterCorners[p].z) > from[p];
-      *values++ += added[hidden];
-    }
-}
-
-void LightVolume::addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
-                           const Vec3f& towards, float perDepth) {
-  if (table_.empty() || box.isEmpty()) return;
-  const Affine toWorld = inverse(worldToLattice_);
-  const Vec3f slice = toWorld.linear * Vec3f{0, 0, 1};
-  Box reach;
-  for (int corner = 0; corner != 8; ++corner)
-    reach = reach.including(
-        worldToLattice_({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                         corner & 4 ? box.max.z : box.min.z}));
-  const bool falls = dot(slice, towards) > 0;
-  const float start = falls ? reach.max.z + 1 : reach.min.z - 1, sign = falls ? -1.0f : 1.0f;
-  const Vec3d way = Vec3d(slice) * double(sign);
-  const double perSlice = length(way);
-  const std::size_t across = std::size_t(brickCount_.x) * std::size_t(brickCount_.y);
-  parallelFor(across, 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t column = begin; column != end; ++column) {
-      const Vec3i node = (firstBrick_ + Vec3i{int(column % std::size_t(brickCount_.x)),
-                                              int(column / std::size_t(brickCount_.x)), 0}) *
-                         kBrick;
-      constexpr float margin = 1;
-      if (float(node.x) - margin > reach.max.x || float(node.x + kBrick) + margin < reach.min.x ||
-          float(node.y) - margin > reach.max.y || float(node.y + kBrick) + margin < reach.min.y)
-        continue;
-      detail::ColumnShade shade;
-      shade.falls = falls;
-      for (std::size_t m = 0; m != shade.begins.size(); ++m)
-        for (std::size_t p = 0; p != 4; ++p) {
-          const Vec3f at{float(node.x + int(m) % kWidth) + kQuarterCorners[p].x,
-                         float(node.y + int(m) / kWidth) + kQuarterCorners[p].y, start};
-          const double distance = distanceToShade({Vec3d(toWorld(at)), way * (1 / perSlice)});
-          shade.begins[m][p] = sign * start + float(distance / perSlice);
-        }
-      for (std::size_t n = 0; n != std::size_t(brickCount_.z); ++n)
-        if (const std::int32_t pool = table_[n * across + column])
-          shade.addTo(values_.data() + std::size_t(pool) * kVolume, node.z + int(n) * kBrick, perDepth);
-    }
-  });
-}
-
-void detail::replaceBrick(const std::function<float(const Vec3i&)>& column, float* out) {
-  constexpr int n = LightVolume::kWidth, wide = n + 2, plane = wide * wide;
-  std::array<float, wide * plane> values;
-  for (int k = 0; k != wide; ++k)
-    for (int j = 0; j != wide; ++j)
-      for (int i = 0; i != wide; ++i)
-        values[std::size_t(k * plane + j * wide + i)] = column({i - 1, j - 1, k - 1});
-  for (int k = 0; k != n; ++k)
-    for (int j = 0; j != n; ++j)
-      for (int i = 0; i != n; ++i) {
-        const float* at = values.data() + (k + 1) * plane + (j + 1) * wide + i + 1;
-        const float across = at[-1] + at[1] + at[-wide] + at[wide] - 4 * *at,
-                    along = at[-plane] + at[plane] - 2 * *at;
-        *out++ = *at - (2 * across + along) / 12;
-      }
-}
-
-void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
-  const Affine latticeToWorld = inverse(worldToLattice_);
-  parallelFor(table_.size(), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t entry = begin; entry != end; ++entry) {
-      if (!table_[entry]) continue;
-      const auto nx = std::size_t(brickCount_.x), ny = std::size_t(brickCount_.y);
-      const Vec3i node =
-          (firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))}) * kBrick;
-      detail::replaceBrick([&](const Vec3i& at) { return column(latticeToWorld(Vec3f(node + at))); },
-                           values_.data() + std::size_t(table_[entry]) * kVolume);
-    }
-  });
 }
 
 void LightVolume::code() {

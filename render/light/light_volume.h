@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "nephele/modeling/base/progress.h"
@@ -31,10 +32,19 @@ class LightVolume {
   static constexpr int kWidth = kBrick + 1;
   static constexpr int kVolume = kWidth * kWidth * kWidth;
 
+  struct Options {
+    /// Columns beyond this need not be told apart: no light is left there. Bricks that lie wholly beyond it
+    /// are not worked out, and hold this everywhere.
+    float dark = std::numeric_limits<float>::infinity();
+  };
+
   /// @param towards world-space direction towards the light, not zero.
-  /// Cost: one sample of density per node of the bricks that hold density, one sweep, no march.
-  /// @throws Error if `towards` is zero or not finite.
-  LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent());
+  /// Cost: one sample of density per node of the bricks that hold density and light, one sweep, no march.
+  /// @throws Error if `towards` is zero or not finite, or `dark` is not above 0.
+  LightVolume(const RenderVolume& volume, const Vec3f& towards, const Options& options,
+              const Progress& progress = silent());
+  LightVolume(const RenderVolume& volume, const Vec3f& towards, const Progress& progress = silent())
+      : LightVolume(volume, towards, Options{}, progress) {}
 
   /// Sets c at every node to `column` of its place in the world, in place of the sweep's; it is taken to be
   /// interpolated itself, between rays that are as far apart as nodes. Uses all cores.
@@ -44,10 +54,11 @@ class LightVolume {
   const Affine& worldToLattice() const { return worldToLattice_; }
   Vec3i firstBrick() const { return firstBrick_; }
   Vec3i brickCount() const { return brickCount_; }
-  /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros.
+  /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros, and 1, where
+  /// Options::dark is finite, a dark one.
   const std::vector<std::int32_t>& table() const { return table_; }
   /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells. Empty once coded.
-  const std::vector<float>& values() const { return values_; }
+  const detail::UnsetVector<float>& values() const { return values_; }
 
   /// Codes the values for the march, in their own memory: the last thing to do, since neither `replace` nor
   /// `addShade` may follow. Uses all cores.
@@ -77,14 +88,17 @@ class LightVolume {
   struct Patch;
 
   void findBricks(const RenderVolume& volume, const Sweep& sweep);
+  void findDark(const Sweep& sweep);
   void fillColumn(const Sweep& sweep, std::size_t column);
   void store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
              const detail::Slices& at);
+  bool isStored(std::int32_t pool) const { return pool > (dark_ < INFINITY ? 1 : 0); }
 
   Affine worldToLattice_;
   Vec3i firstBrick_, brickCount_;
   std::vector<std::int32_t> table_;
-  std::vector<float> values_;
+  detail::UnsetVector<float> values_;
+  float dark_ = INFINITY;
   CodedBricks coded_;
 };
 

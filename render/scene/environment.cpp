@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/image.h"
 
@@ -22,6 +23,7 @@ namespace nephele {
 namespace {
 
 constexpr float kSpotDegrees = 5, kRingDegrees = 8;
+constexpr std::size_t kRowsTogether = 8;
 
 double luminance(const Vec3f& c) {
   return 0.2126 * double(c.x) + 0.7152 * double(c.y) + 0.0722 * double(c.z);
@@ -45,23 +47,30 @@ struct Environment::Data {
 
   Data(int itsWidth, int itsHeight, std::vector<Vec3f> values)
       : width(itsWidth), height(itsHeight), radiance(std::move(values)) {
-    rows.reserve(std::size_t(height));
-    pixels.reserve(radiance.size());
-    for (int y = 0; y != height; ++y) {
-      double row = 0;
-      const double share = solidAngle(y);
-      for (int x = 0; x != width; ++x) {
-        const Vec3f& value = radiance[std::size_t(y) * std::size_t(width) + std::size_t(x)];
-        whole += Vec3d(value) * share;
-        row += luminance(value) * share;
-        pixels.push_back(row);
+    rows.resize(std::size_t(height));
+    pixels.resize(radiance.size());
+    std::vector<Vec3d> sums(rows.size());
+    parallelFor(rows.size(), kRowsTogether, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t y = begin; y != end; ++y) {
+        double row = 0;
+        const double share = solidAngle(int(y));
+        for (std::size_t at = y * std::size_t(width); at != (y + 1) * std::size_t(width); ++at) {
+          sums[y] += Vec3d(radiance[at]) * share;
+          row += luminance(radiance[at]) * share;
+          pixels[at] = row;
+        }
+        rows[y] = row;
       }
-      bright += row;
-      rows.push_back(bright);
+    });
+    for (std::size_t y = 0; y != rows.size(); ++y) {
+      whole += sums[y];
+      bright += rows[y];
+      rows[y] = bright;
     }
   }
 
   double cosineAbove(int y) const { return std::cos(double(kPi) * y / height); }
+  double middleCosine(int y) const { return (cosineAbove(y) + cosineAbove(y + 1)) / 2; }
   double solidAngle(int y) const { return 2 * double(kPi) / width * (cosineAbove(y) - cosineAbove(y + 1)); }
 };
 
@@ -126,21 +135,34 @@ Vec3f Environment::mean() const {
 }
 
 std::vector<Vec3f> Environment::around(const std::vector<Vec3f>& directions) const {
-  std::vector<Vec3d> sums(directions.size());
-  std::vector<double> angles(directions.size());
-  for (int y = 0; y != data_->height; ++y) {
-    const double share = data_->solidAngle(y);
-    const double cosine = (data_->cosineAbove(y) + data_->cosineAbove(y + 1)) / 2;
-    for (int x = 0; x != data_->width; ++x) {
-      const Vec3f d = towards(x + 0.5, cosine);
-      std::size_t nearest = 0;
-      float most = -2;
-      for (std::size_t i = 0; i != directions.size(); ++i)
-        if (const float c = dot(directions[i], d); c > most) most = c, nearest = i;
-      sums[nearest] +=
-          Vec3d(data_->radiance[std::size_t(y) * std::size_t(data_->width) + std::size_t(x)]) * share;
-      angles[nearest] += share;
+  // Row by row, added in their order.
+  struct Part {
+    Vec3d sum;
+    double angle = 0;
+  };
+  const std::size_t count = directions.size(), width = std::size_t(data_->width),
+                    height = std::size_t(data_->height);
+  std::vector<Part> parts(height * count);
+  parallelFor(height, kRowsTogether, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y != end; ++y) {
+      const double share = data_->solidAngle(int(y)), cosine = data_->middleCosine(int(y));
+      for (std::size_t x = 0; x != width; ++x) {
+        const Vec3f d = towards(double(x) + 0.5, cosine);
+        std::size_t nearest = 0;
+        float most = -2;
+        for (std::size_t i = 0; i != count; ++i)
+          if (const float c = dot(directions[i], d); c > most) most = c, nearest = i;
+        Part& part = parts[y * count + nearest];
+        part.sum += Vec3d(data_->radiance[y * width + x]) * share;
+        part.angle += share;
+      }
     }
+  });
+  std::vector<Vec3d> sums(count);
+  std::vector<double> angles(count);
+  for (std::size_t i = 0; i != parts.size(); ++i) {
+    sums[i % count] += parts[i].sum;
+    angles[i % count] += parts[i].angle;
   }
   std::vector<Vec3f> result(directions.size());
   Vec3d meanOfMeans;
@@ -183,8 +205,7 @@ std::vector<DistantLight> Environment::takeSpots(int most) {
     });
     if (!(luminance(*peak) > 10 * mean)) break;
     const auto directionOf = [&](std::size_t pixel) {
-      const int y = int(pixel / width);
-      return towards(double(pixel % width) + 0.5, (data_->cosineAbove(y) + data_->cosineAbove(y + 1)) / 2);
+      return towards(double(pixel % width) + 0.5, data_->middleCosine(int(pixel / width)));
     };
     const Vec3f middle = directionOf(std::size_t(peak - radiance.begin()));
     const float inner = std::cos(radians(kSpotDegrees)), outer = std::cos(radians(kRingDegrees));
@@ -192,7 +213,14 @@ std::vector<DistantLight> Environment::takeSpots(int most) {
     std::vector<Vec3f> before;
     Vec3d ring;
     double ringAngle = 0;
+    // No row is nearer to the middle than their heights are, and a little for rounding.
+    const double height = std::acos(std::clamp(double(middle.y), -1.0, 1.0));
+    const double reach = double(radians(kRingDegrees)) + 1e-3;
     for (std::size_t i = 0; i != radiance.size(); ++i) {
+      if (i % width == 0 && std::fabs(std::acos(data_->middleCosine(int(i / width))) - height) > reach) {
+        i += width - 1;
+        continue;
+      }
       const float c = dot(directionOf(i), middle);
       if (c >= inner) {
         inside.push_back(i);

@@ -80,6 +80,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
+#include <algorithm>
 #include <bit>
 #include <utility>
 
@@ -108,20 +109,38 @@ std::vector<float> code(const float* nodes, const std::size_t (&strides)[3], flo
 
 }  // namespace
 
-CodedBricks::CodedBricks(const BrickGrid& grid) : floatCount_(grid.poolSize() * kPairs) {
-  constexpr std::size_t row = BrickGrid::kWidth;
+CodedBricks::CodedBricks(const BrickGrid& grid) : CodedBricks(grid, [](std::size_t, std::size_t) {}) {}
+
+CodedBricks CodedBricks::inPlaceOf(BrickGrid& grid) {
+  return CodedBricks(grid, [&](std::size_t begin, std::size_t end) {
+    detail::releasePages(grid.brick(std::int32_t(begin)), grid.brick(std::int32_t(end)));
+  });
+}
+
+// In parts, `done(begin, end)` being told of the bricks of each.
+template <class Done>
+CodedBricks::CodedBricks(const BrickGrid& grid, const Done& done) : floatCount_(grid.poolSize() * kPairs) {
+  constexpr std::size_t row = BrickGrid::kWidth, kTogether = 8192;
   const std::shared_ptr<float[]> pairs = std::make_shared_for_overwrite<float[]>(floatCount_);
   detail::useHugePages(pairs.get(), pairs.get() + floatCount_);
-  const std::vector<float> units =
-      code(grid.values().data() + sampleOffset(0, 0, 0), {BrickGrid::kVolume, row, row * row}, pairs.get(),
-           kPairs, grid.poolSize());
+  std::vector<float> units;
+  units.reserve(grid.poolSize());
+  for (std::size_t begin = 0; begin != grid.poolSize();) {
+    const std::size_t end = std::min(begin + kTogether, grid.poolSize());
+    const std::vector<float> some =
+        code(grid.brick(std::int32_t(begin)) + sampleOffset(0, 0, 0), {BrickGrid::kVolume, row, row * row},
+             pairs.get() + begin * kPairs, kPairs, end - begin);
+    units.insert(units.end(), some.begin(), some.end());
+    done(begin, end);
+    begin = end;
+  }
   pairs_ = {pairs, pairs.get()};
   enter(grid.table(), units, kPairs);
 }
 
-CodedBricks::CodedBricks(std::vector<float> nodes, std::span<const std::int32_t> table)
+CodedBricks::CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table)
     : floatCount_(nodes.size()) {
-  const auto pairs = std::make_shared<std::vector<float>>(std::move(nodes));
+  const auto pairs = std::make_shared<detail::UnsetVector<float>>(std::move(nodes));
   float* data = pairs->data();
   const std::vector<float> units = code(data, {kNodes, kWidth, kPlane}, data, kNodes, floatCount_ / kNodes);
   pairs_ = {pairs, data};

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/math.h"
 
 namespace nephele {
@@ -39,10 +40,13 @@ class CodedBricks {
   /// The nodes 0 to 8 of the bricks of a grid. Cost: one pass over its pool, all cores.
   /// @throws Error if the grid has more bricks than can be addressed (5.8 million).
   explicit CodedBricks(const BrickGrid& grid);
+  /// The same, and gives the memory of the grid's samples back while it goes through them: they read as 0
+  /// from then on. Ranges and layout stay.
+  static CodedBricks inPlaceOf(BrickGrid& grid);
 
   /// Takes the memory of `nodes`, kNodes for every pool brick, and codes them in place.
   /// @throws Error as above.
-  CodedBricks(std::vector<float> nodes, std::span<const std::int32_t> table);
+  CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table);
 
   bool isEmpty() const { return entries_.empty(); }
   /// Pairs, as the bits of floats.
@@ -60,6 +64,8 @@ class CodedBricks {
   static std::size_t estimateBytes(const BrickGrid& grid);
 
  private:
+  template <class Done>
+  CodedBricks(const BrickGrid& grid, const Done& done);
   void enter(std::span<const std::int32_t> table, const std::vector<float>& units, std::size_t stride);
 
   std::shared_ptr<const float> pairs_;

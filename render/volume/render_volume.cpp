@@ -246,8 +246,18 @@ float RenderVolume::typicalDensity() const {
 }
 
 const CodedBricks& RenderVolume::coded() const {
-  std::call_once(coded_->once, [this] { coded_->bricks = CodedBricks(*density_); });
+  std::call_once(coded_->once, [this] {
+    if (coded_->isInPlace && density_.use_count() == 1)
+      // Grids are made to be written; only what is shared is not.
+      coded_->bricks = CodedBricks::inPlaceOf(const_cast<BrickGrid&>(*density_));
+    else
+      coded_->bricks = CodedBricks(*density_);
+  });
   return coded_->bricks;
+}
+
+void RenderVolume::giveUpSamples() {
+  coded_->isInPlace = true;
 }
 
 std::size_t RenderVolume::memoryBytes() const {

@@ -48,6 +48,10 @@ class RenderVolume {
   /// The density as the march reads it. Made at the first call, by one thread of those that ask. Cost: one
   /// pass over the samples.
   const CodedBricks& coded() const;
+  /// From now on the samples of `density` are given back when `coded` is made, since what follows is only
+  /// marched: they read as 0 then. Layers of normals, the path tracer and light made anew need them. The grid
+  /// must be this volume's alone, which else keeps it.
+  void giveUpSamples();
   /// Null where the grid is all there is.
   const FieldDensity* field() const { return field_.get(); }
   const VolumeColour& colour() const { return colour_; }
@@ -88,6 +92,7 @@ class RenderVolume {
   struct Coded {
     std::once_flag once;
     CodedBricks bricks;
+    bool isInPlace = false;
   };
 
   void checkColour(const VolumeColour::Grids& grids, const char* name) const;

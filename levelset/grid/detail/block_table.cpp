@@ -114,7 +114,7 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
   requireFinite(constants.data(), int(constants.size()), name);
   result->reserve(pool);
   for (std::size_t c = 1; c < constants.size(); ++c) result->appendConstant(blocks.sign * constants[c]);
-  result->append(rowStart[rowCount]);
+  result->appendUnset(rowStart[rowCount]);
   parallelFor(rowCount, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       if (rowStart[row + 1] == rowStart[row]) continue;

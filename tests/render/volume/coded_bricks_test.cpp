@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <vector>
 
 #include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/render/volume/render_volume.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
 
@@ -29,8 +31,8 @@ void forEachNode(Check&& check) {
 
 // One brick of `value` at its nodes.
 template <class Value>
-std::vector<float> brickOf(Value&& value) {
-  std::vector<float> nodes(CodedBricks::kNodes);
+detail::UnsetVector<float> brickOf(Value&& value) {
+  detail::UnsetVector<float> nodes(CodedBricks::kNodes);
   forEachNode([&](const Vec3i& node) { nodes[nodeOf(node)] = value(node); });
   return nodes;
 }
@@ -40,7 +42,7 @@ constexpr std::int32_t kOne[] = {0};
 TEST(CodedBricks, AreHalfAUnitOffAtMost) {
   // A unit is 1 / 57343 of the brick's largest value.
   for (const float scale : {1e-20f, 0.01f, 1.0f, 3e5f}) {
-    const std::vector<float> nodes = brickOf([&](const Vec3i& n) {
+    const detail::UnsetVector<float> nodes = brickOf([&](const Vec3i& n) {
       return scale * std::fabs(std::sin(float(7 * n.x + 3 * n.y) + 0.3f * float(n.z)));
     });
     const float most = *std::max_element(nodes.begin(), nodes.end());
@@ -95,7 +97,7 @@ TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
   });
   const CodedBricks expected(*grid);
   // The same nodes, brick by brick.
-  std::vector<float> nodes;
+  detail::UnsetVector<float> nodes;
   for (std::size_t pool = 0; pool != grid->poolSize(); ++pool)
     for (int z = 0; z != kWidth; ++z)
       for (int y = 0; y != kWidth; ++y) {
@@ -115,6 +117,27 @@ TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
     }
   });
   EXPECT_EQ(expected.memoryBytes(), CodedBricks::estimateBytes(*grid));
+}
+
+TEST(CodedBricks, TakeTheMemoryOfSamplesThatAreGivenUp) {
+  const auto grid = test::ball(1, 0.02f);
+  const auto layout = grid->table();
+  RenderVolume kept(grid), given(std::make_shared<BrickGrid>(*grid));
+  given.giveUpSamples();
+  const CodedBricks &all = kept.coded(), &same = given.coded();
+  for (std::size_t place = 0; place < layout.size(); place += 7)
+    for (const Vec3i& node : {Vec3i{0, 0, 0}, Vec3i{3, 8, 5}, Vec3i{8, 8, 8}})
+      ASSERT_EQ(all.at(place, node), same.at(place, node)) << place;
+  EXPECT_EQ(given.density().table(), layout);
+  // Whole pages of them.
+  const auto zeros = std::ranges::count(given.density().values(), 0.0f);
+  EXPECT_GT(double(zeros), 0.9 * double(given.density().values().size()));
+  EXPECT_EQ(kept.density().values(), grid->values());
+  // A grid that another volume marches, too, stays as it is.
+  RenderVolume shared(grid);
+  shared.giveUpSamples();
+  shared.coded();
+  EXPECT_EQ(shared.density().values(), grid->values());
 }
 
 }  // namespace
