@@ -63,7 +63,8 @@ void addIntegrator(CLI::App& app, PictureOptions& options) {
       ->type_name("TEXT")
       ->check(CLI::IsMember({"march", "path"}))
       ->default_str("march");
-  addCount(app, "--spp", options.path.samplesPerPixel, 1, 1 << 20, "Paths per pixel of --integrator path.");
+  addCount(app, "--spp", options.path.samplesPerPixel, 1, 1 << 20, "Paths per pixel of --integrator path.")
+      ->each([&options](const std::string&) { options.pathsGiven = true; });
   addCount(app, "--scatterings", options.path.maxScatterings, 0, 1000000,
            "Scatterings at which paths end, 0: never.");
 }
@@ -85,6 +86,11 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   addCameraOptions(app, options);
   addLightOptions(app, options.light);
   addMedium(app, options);
+  addChoice<Quality>(
+      app, "--quality", options.quality,
+      {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
+      "Sets --samples, --step, --adaptive and --spp together, for a first look, a picture, or the last "
+      "one; each of them still says more where it is given.");
   addLength(app, "--step", options.step, "Longest step along a ray.", Sign::positive)
       ->default_str("one voxel");
   addCount(app, "--samples", options.render.samples, 1, 4096, "Rays per pixel.")
@@ -92,7 +98,8 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->default_str("4, or 64 with depth of field or motion blur");
   addNumber(
       app, "--adaptive", options.adaptiveThreshold, 0, 1,
-      "March only pixels whose neighbours differ by more than this share of brightness or opacity; 0: all.");
+      "March only pixels whose neighbours differ by more than this share of brightness or opacity; 0: all.")
+      ->each([&options](const std::string&) { options.adaptiveGiven = true; });
   addIntegrator(app, options);
   addCount(app, "--seed", options.seed, 0, 1 << 30, "Moves the pattern of the samples.");
   std::vector<std::string> layers = Film::layerNames();
@@ -131,6 +138,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostB
   if (adaptiveThreshold > 0 && pathTraced)
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
+  result.chooseByQuality(volume);
   result.lights = light.resolved(mostBytes);
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
@@ -144,9 +152,24 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostB
   return result;
 }
 
+void PictureOptions::chooseByQuality(const RenderVolume& volume) {
+  const QualityChoices choices = QualityChoices::of(quality);
+  if (!samplesGiven) render.samples = choices.samples;
+  if (!pathsGiven) path.samplesPerPixel = choices.pathsPerPixel;
+  // The standard step is the marcher's own: longer where the density hardly varies.
+  if (!render.step && choices.stepVoxels != 1 && !volume.isEmpty())
+    render.step = choices.stepVoxels * volume.density().voxelSize();
+  if (!adaptiveGiven && !pathTraced) render.adaptiveThreshold = choices.adaptiveThreshold;
+}
+
+bool PictureOptions::needsSamples() const {
+  return pathTraced || std::ranges::count(render.aovs, "normal") > 0;
+}
+
 RenderOptions PictureOptions::marched(const Camera& camera) const {
   RenderOptions options = render;
-  if (!samplesGiven && (camera.hasLens() || camera.isMoving() || render.volumeMotion)) options.samples = 64;
+  if (!samplesGiven && (camera.hasLens() || camera.isMoving() || render.volumeMotion))
+    options.samples = QualityChoices::of(quality).blurredSamples;
   return options;
 }
 

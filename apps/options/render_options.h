@@ -8,6 +8,7 @@
 #include "apps/app.h"
 #include "apps/options/camera_options.h"
 #include "apps/options/light_options.h"
+#include "apps/options/quality_options.h"
 #include "apps/options/volume_options.h"
 #include "nephele/render/image/display_server.h"
 #include "nephele/render/image/image.h"
@@ -28,7 +29,9 @@ struct PictureOptions : CameraOptions {
   Length step;
   double adaptiveThreshold = 0;
   RenderOptions render;
-  bool samplesGiven = false;
+  Quality quality = Quality::good;
+  /// These say more than the quality does.
+  bool samplesGiven = false, adaptiveGiven = false, pathsGiven = false;
   int seed = 0;
   /// Path traces instead of marching; what both have in common is taken from `render`.
   bool pathTraced = false;
@@ -40,6 +43,8 @@ struct PictureOptions : CameraOptions {
 
   /// These options with everything filled in that follows from `volume`.
   PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
+  /// Whether a still reads the samples of the volume's grid after its light has been made.
+  bool needsSamples() const;
   /// `render` with the rays per pixel that suit `camera`, unless they were given.
   RenderOptions marched(const Camera& camera) const;
   /// `path`, with what both integrators have in common.
@@ -50,6 +55,9 @@ struct PictureOptions : CameraOptions {
   RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
   /// What files say of a picture.
   std::map<std::string, std::string> metadata(const Run& run) const;
+
+ private:
+  void chooseByQuality(const RenderVolume& volume);
 };
 
 /// Says so if the picture for `path` holds values that no file can; returns how many.

@@ -44,13 +44,13 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
   if (!options.deep.empty()) picture.render.deep.emplace();
   if (!options.deep.empty() && picture.adaptiveThreshold > 0)
     refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
+  if (!options.deep.empty()) picture.render.adaptiveThreshold = 0;
   if (!options.holdout.empty())
     picture.render.holdout = readHoldout(options.holdout, camera, run.memoryLimitBytes);
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
-  const RenderVolume volume =
-      readVolumes(options.inputs, options.picture.volumes, options.picture.shutter, run);
+  RenderVolume volume = readVolumes(options.inputs, options.picture.volumes, options.picture.shutter, run);
   if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
   PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   const Camera camera = picture.camera(volume);
@@ -58,6 +58,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   run.requireMemory(double(volume.memoryBytes()) + picture.estimateBytes(volume, camera),
                     "make the picture smaller (--size), or the volume with larger voxels");
   picture.light.writeShadows(volume, picture.lights, picture.medium, run);
+  if (!picture.needsSamples()) volume.giveUpSamples();
   LivePicture live(picture.displayServer, options.output, picture.render);
   RenderResult result = picture.picture(volume, camera, run);
   if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);

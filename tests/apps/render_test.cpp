@@ -27,6 +27,39 @@ class RenderVerb : public testing::Test {
   static inline TemporaryFolder* folder_ = nullptr;
 };
 
+// Rays are those of all pixels; of a draft, of those that are not like their neighbours.
+TEST_F(RenderVerb, TakesQualitiesWhereNothingElseIsSaid) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("final.toml")) << "quality = \"final\"\n";
+  std::ofstream(folder.file("two.toml")) << "samples = 2\n";
+  const auto statsOf = [&](const std::string& options) {
+    const ProgramResult result = runProgram("render " + fog() + " -o " + folder.file("a.exr") +
+                                            " --size 32x24 --stats " + folder.file("s.json") + " " + options);
+    EXPECT_EQ(result.exitCode, 0) << options << ": " << result.errors;
+    return nlohmann::json::parse(textOf(folder.file("s.json")));
+  };
+  const auto raysOf = [&](const std::string& options) { return statsOf(options)["rays"].get<int>(); };
+  constexpr int pixels = 32 * 24;
+  EXPECT_EQ(raysOf(""), 4 * pixels);
+  EXPECT_EQ(raysOf("--quality good"), 4 * pixels);
+  EXPECT_LT(raysOf("--quality draft"), pixels);
+  EXPECT_EQ(raysOf("--quality draft --adaptive 0"), pixels);
+  EXPECT_EQ(raysOf("--quality draft --deep " + folder.file("d.exr")), pixels);
+  EXPECT_EQ(raysOf("--quality draft --integrator path"), 16 * pixels);
+  EXPECT_EQ(raysOf("--quality draft --integrator path --spp 3"), 3 * pixels);
+  EXPECT_EQ(raysOf("--quality final"), 16 * pixels);
+  EXPECT_EQ(raysOf("--samples 2 --quality final"), 2 * pixels);
+  EXPECT_EQ(raysOf("--quality final --config " + folder.file("two.toml")), 2 * pixels);
+  EXPECT_EQ(raysOf("--samples 3 --config " + folder.file("final.toml")), 3 * pixels);
+  // Half a voxel against the standard step; and one that is given.
+  const auto samplesOf = [&](const std::string& options) {
+    return statsOf(options)["samples"].get<double>();
+  };
+  EXPECT_GT(samplesOf("--quality final --samples 4"), 1.2 * samplesOf("--quality good"));
+  EXPECT_EQ(samplesOf("--quality final --samples 4 --step 0.2"), samplesOf("--quality good --step 0.2"));
+  EXPECT_EQ(runProgram("render " + fog() + " -o " + folder.file("b.exr") + " --quality best").exitCode, 2);
+}
+
 TEST_F(RenderVerb, WritesAPictureAPreviewAndStatistics) {
   const TemporaryFolder folder;
   const ProgramResult result =
