@@ -234,7 +234,7 @@ TEST(Advection, ContinuesAMapAsIfItHadNeverStopped) {
 TEST(Advection, DoesNotDependOnTheThreads) {
   const Grid ball = softBallGrid(12);
   for (const Method method : kMethods) {
-    std::vector<float> values[2];
+    detail::UnsetVector<float> values[2];
     for (int run = 0; run < 2; ++run) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, run == 0 ? 1 : 4);
       values[run] = advectGrids({ball}, stirring(), {.method = method, .steps = 3}).grids[0]->values();

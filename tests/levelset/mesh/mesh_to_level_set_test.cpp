@@ -229,7 +229,7 @@ TEST(MeshToLevelSet, SignAgreesWithOpenVdbAwayFromTheSurface) {
 
 TEST(MeshToLevelSet, IsTheSameAtAnyThreadCount) {
   const Mesh mesh = torusMesh(1.0, 0.4, 96, 48);
-  std::vector<std::vector<float>> results;
+  std::vector<detail::UnsetVector<float>> results;
   for (const std::size_t threads : {1u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     results.push_back(toBricks(meshToLevelSet(mesh, {.voxelSize = 0.03}))->values());
