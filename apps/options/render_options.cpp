@@ -53,7 +53,7 @@ void addMedium(CLI::App& app, PictureOptions& options) {
       ->type_name("isotropic|rayleigh|hg:G|schlick:K|two-lobe:G1,G2,MIX|mie:MICROMETRES")
       ->default_str(fmt::format("hg:{:g}", options.medium.phase.meanCosine()));
   addCount(app, "--octaves", options.render.octaves.count, 1, 16,
-           "Octaves of light that goes on through the volume but little bent; 1 is single scattering.");
+           "Terms of the light that is scattered forward several times on its way; 1 is single scattering.");
 }
 
 void addIntegrator(CLI::App& app, PictureOptions& options) {

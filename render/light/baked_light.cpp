@@ -87,7 +87,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
     shadowDeeply(volume, light, shadows, progress);
     if (surfaces && surfaces->castsShadows()) shadows.addShade(toShade, columnPerDepth(light.shadow));
   }
-  scatter(volume, before, progress);
+  scatter(before, progress);
   for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
   code();
 }
@@ -120,7 +120,9 @@ float BakedLight::darkColumn(const Vec3f& shadow) const {
   const float albedo = std::max({meanAlbedo.x, meanAlbedo.y, meanAlbedo.z});
   float least = 1;
   for (int c = 0; c != 3; ++c) least = std::min(least, shadow[c] * scene.extinctionColour[c]);
-  const float seen = scene.extinction * least * (1 - albedo * largestMoment(medium.phase));
+  // So is the rest where cells are thinned.
+  const float seen = std::min(scene.extinction * least * (1 - albedo * largestMoment(medium.phase)),
+                              least * ScatteredLight::leastExtinction(*source, solverOptions()));
   return seen > 0 ? kDarkDepth / seen : std::numeric_limits<float>::infinity();
 }
 
@@ -171,9 +173,8 @@ void BakedLight::addLocal(const LocalLight& light, const ProjectedLightVolume& s
   if (phaseTable.empty())
     for (int n = 0; n != scene.octaves; ++n)
       for (int i = 0; i <= nodes; ++i) {
-        const float sine = float(i) / float(nodes), cosine = 1 - 2 * sine * sine;
-        const float next = n + 1 < scene.octaves ? phases[std::size_t(n + 1)](cosine) : 0.0f;
-        phaseTable.push_back(phases[std::size_t(n)](cosine) - next);
+        const float sine = float(i) / float(nodes);
+        phaseTable.push_back(forward.weight(n, 1 - 2 * sine * sine));
       }
   MarchScene::Local& local = scene.locals.emplace_back();
   for (const ProjectedLightVolume::Face& face : shadows.faces())
@@ -215,65 +216,75 @@ void BakedLight::setColours(const RenderVolume& volume, float most) {
 
 // Sets what light does after its first scattering; the sky's part is that of `before` where skies are
 // equal.
-void BakedLight::scatter(const RenderVolume& volume, const BakedLight* before, const Progress& progress) {
-  const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3,
-              g = std::max(medium.phase.meanCosine(), 0.0f);
-  phases = {medium.phase};
-  scene.octaves = g > 0 ? octaves.count : 1;
-  for (int n = 1; n < scene.octaves; ++n) {
-    scene.attenuation[n] = 1 - albedo * std::pow(g, float(octaves.count - n));
-    phases.push_back(Phase::henyeyGreenstein(std::min(std::pow(g, float(n) + octaves.bend), 0.99f)));
-  }
+void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
+  const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3;
   const bool once = octaves.count == 1;
+  moments_ = once ? std::vector<float>{1.0f} : legendreMoments(medium.phase);
+  forward =
+      once ? ForwardLight(medium.phase)
+           : ForwardLight(medium.phase, moments_, albedo, solverOptions().degree(moments_), octaves.count);
+  scene.octaves = forward.count();
+  for (int n = 0; n != scene.octaves; ++n) scene.attenuation[n] = forward.attenuation(n);
   const std::size_t count = suns.size() + locals.size();
   for (std::size_t light = 0; light <= count; ++light)
     for (int c = 0; c != scene.colours; ++c) {
       std::shared_ptr<const ScatteredLight> made;
       if (light < count) {
-        if (!once)
-          made = scatteredLight(volume, c, meanAlbedo[c], octaves.gain * medium.albedo[c], sourceOf(light, c),
-                                nameOf(light), progress);
+        if (!once) {
+          const Vec3f shadow =
+              light < suns.size() ? distant[light].shadow : lights.locals[light - suns.size()].shadow;
+          if (const int like = colourLike(c, shadow); like != c)
+            made = scattered[scattered.size() - std::size_t(c - like)];
+          else
+            made = scatteredLight(c, meanAlbedo[c], sourceOf(light, c), nameOf(light), progress);
+        }
       } else if (lights.hasSky()) {
         if (before && before->lights.sky == lights.sky && before->sky == sky &&
             before->scene.colours == scene.colours)
           made = before->scattered[before->scattered.size() - std::size_t(scene.colours - c)];
+        else if (const int like = colourLike(c, {1, 1, 1}); like != c && !sky)
+          made = scattered[scattered.size() - std::size_t(c - like)];
         else
-          made = scatteredLight(volume, c, once ? 0 : meanAlbedo[c], medium.albedo[c],
+          made = scatteredLight(c, once ? 0 : meanAlbedo[c],
                                 sky ? sourceOfSky(c) : ScatteredSource::evenSky(), "sky", progress);
       }
-      if (made) {
-        toScattered.emplace(made->worldToLattice());
-        scene.scatteredSize = made->size();
-      }
-      scattered.push_back(made);
-      scene.scattered.push_back(made ? made->values().data() : nullptr);
+      keep(scattered, made);
     }
-  if (!toScattered) scene.scattered.clear();
-  if (volume.hasEmission() && !once && g < 1) scatterGlow(volume, g, progress);
-  // Light that flows outwards is brighter towards the eye than the mean over directions, by as much as the
-  // mean is brighter where it comes from: 3 g F, F its flux, is what the mean gains along this way.
-  const float typical = volume.typicalDensity() * medium.extinction * (1 - albedo * g);
-  lookAhead = once ? 0
-                   : std::min(octaves.lookAhead * g / std::max(typical, 1e-30f),
-                              volume.worldBounds().longestSide() / 16);
+  if (source->hasEmission() && !once) scatterGlow(progress);
+}
+
+ScatteredLight::Options BakedLight::solverOptions() const {
+  return {.order = octaves.order};
+}
+
+// The first colour in which light is scattered as in this one.
+int BakedLight::colourLike(int colour, const Vec3f& shadow) const {
+  int like = 0;
+  while (meanAlbedo[like] != meanAlbedo[colour] || shadow[like] != shadow[colour] ||
+         medium.extinctionColour[like] != medium.extinctionColour[colour])
+    ++like;
+  return like;
+}
+
+void BakedLight::keep(std::vector<std::shared_ptr<const ScatteredLight>>& kept,
+                      std::shared_ptr<const ScatteredLight> light) {
+  if (light) {
+    toScattered.emplace(light->worldToLattice());
+    scene.scatteredSize = light->size();
+  }
+  kept.push_back(std::move(light));
 }
 
 // What is scattered of the light of what glows: a source of its own per optical depth, wherever there is
 // density.
-void BakedLight::scatterGlow(const RenderVolume& volume, float g, const Progress& progress) {
+void BakedLight::scatterGlow(const Progress& progress) {
   if (meanAlbedo == Vec3f{}) return;
   for (int c = 0; c != 3; ++c) {
-    const float albedo = std::max(meanAlbedo[c], 1e-3f);
-    const float share = 4 * kPi / (albedo * (1 - g) * std::max(medium.extinctionColour[c], 1e-3f));
     ScatteredSource glowing;
-    glowing.column = [](const Vec3f&) { return 0.0f; };
-    glowing.irradiance = [&volume, c, share](const Vec3f& world) {
-      return share * volume.emissionPerDensity(world, c);
+    glowing.glow = [this, c, share = 1 / std::max(medium.extinctionColour[c], 1e-3f)](const Vec3f& world) {
+      return share * source->emissionPerDensity(world, c);
     };
-    glow.push_back(scatteredLight(volume, c, albedo, medium.albedo[c], glowing, "glow", progress));
-    scene.glow[c] = glow.back()->values().data();
-    scene.scatteredSize = glow.back()->size();
-    toScattered.emplace(glow.back()->worldToLattice());
+    keep(glow, scatteredLight(c, meanAlbedo[c], glowing, "glow", progress));
   }
 }
 
@@ -284,7 +295,7 @@ const std::string& BakedLight::nameOf(std::size_t light) const {
 // Irradiance per gain.
 ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
   if (light < suns.size()) {
-    ScatteredSource result = ScatteredSource::of(suns[light]);
+    ScatteredSource result = ScatteredSource::of(suns[light], distant[light].direction);
     result.shadow = distant[light].shadow[colour];
     return result;
   }
@@ -292,6 +303,7 @@ ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
   const ProjectedLightVolume& shadows = locals[light - suns.size()];
   ScatteredSource result;
   result.shadow = local.shadow[colour];
+  result.place = local.position;
   result.column = [&shadows](const Vec3f& world) { return shadows.columnDensity(world); };
   // The mean of 1 / r^2 over a ball as large as a voxel, about the light, is that at this distance.
   result.irradiance = [&local, least = 0.36f * voxelSize](const Vec3f& world) {
@@ -311,19 +323,17 @@ ScatteredSource BakedLight::sourceOfSky(int colour) const {
   return result;
 }
 
-// The light `from` somewhere in one colour, times `share`.
-std::shared_ptr<const ScatteredLight> BakedLight::scatteredLight(const RenderVolume& volume, int colour,
-                                                                 float albedo, float share,
+// The light `from` somewhere in one colour.
+std::shared_ptr<const ScatteredLight> BakedLight::scatteredLight(int colour, float albedo,
                                                                  const ScatteredSource& from,
                                                                  const std::string& name,
                                                                  const Progress& progress) const {
   progress.begin("scatter " + name);
-  const auto made =
-      std::make_shared<ScatteredLight>(volume,
-                                       Scattering{scene.extinction * scene.extinctionColour[colour], albedo,
-                                                  albedo > 0 ? medium.phase.meanCosine() : 0},
-                                       from, ScatteredLight::Options{}, progress);
-  made->scale(share);
+  auto made = std::make_shared<ScatteredLight>(
+      *source, Scattering{scene.extinction * scene.extinctionColour[colour], albedo, moments_}, from,
+      solverOptions(), progress);
+  progress.count("sweeps", double(made->sweeps()));
+  progress.count("light_residual", double(made->residual()));
   return made;
 }
 

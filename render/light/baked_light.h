@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nephele/render/light/light_volume.h"
+#include "nephele/render/light/phase_expansion.h"
 #include "nephele/render/light/projected_light_volume.h"
 #include "nephele/render/light/scattered_light.h"
 #include "nephele/render/scene/environment.h"
@@ -47,20 +48,20 @@ struct BakedLight {
   std::vector<Vec3f> gains;
   Vec3f skyGain;
   std::vector<std::size_t> layers;
-  /// As scene.scattered.
-  std::vector<std::shared_ptr<const ScatteredLight>> scattered;
-  /// As scene.glow.
-  std::vector<std::shared_ptr<const ScatteredLight>> glow;
-  /// Along a ray, to where its scattered light is read.
-  float lookAhead = 0;
+  /// As scene.scattered and scene.glow, which ViewLight makes of them; shared by colours that are alike.
+  std::vector<std::shared_ptr<const ScatteredLight>> scattered, glow;
   std::vector<Vec3d> directions;
-  std::vector<Phase> phases;
+  ForwardLight forward;
   MarchScene scene;
   Box bounds;
   /// Of the medium, times the mean colour of the volume.
   Vec3f meanAlbedo;
 
  private:
+  // Of the phase function.
+  std::vector<float> moments_;
+
+  ScatteredLight::Options solverOptions() const;
   float columnPerDepth(const Vec3f& shadow) const;
   float darkColumn(const Vec3f& shadow) const;
   template <class Light, class Columns>
@@ -70,15 +71,17 @@ struct BakedLight {
   void addLocal(const LocalLight& light, const ProjectedLightVolume& shadows);
   void code();
   void setColours(const RenderVolume& volume, float most);
-  void scatter(const RenderVolume& volume, const BakedLight* before, const Progress& progress);
-  void scatterGlow(const RenderVolume& volume, float g, const Progress& progress);
+  void scatter(const BakedLight* before, const Progress& progress);
+  void scatterGlow(const Progress& progress);
   const std::string& nameOf(std::size_t light) const;
   ScatteredSource sourceOf(std::size_t light, int colour) const;
   ScatteredSource sourceOfSky(int colour) const;
-  std::shared_ptr<const ScatteredLight> scatteredLight(const RenderVolume& volume, int colour, float albedo,
-                                                       float share, const ScatteredSource& from,
+  std::shared_ptr<const ScatteredLight> scatteredLight(int colour, float albedo, const ScatteredSource& from,
                                                        const std::string& name,
                                                        const Progress& progress) const;
+  int colourLike(int colour, const Vec3f& shadow) const;
+  void keep(std::vector<std::shared_ptr<const ScatteredLight>>& lights,
+            std::shared_ptr<const ScatteredLight> light);
 };
 
 }  // namespace nephele::detail

@@ -1,101 +1,68 @@
-// Multiple scattering by discrete ordinates.
+// Multiple scattering by discrete ordinates: light is swept through a lattice in a few directions
+// (LightSweep), scattered by the low moments of the phase function, until it does not change any more
+// (TransportSolver).
 //
-// Light is swept through the lattice in a few directions (LightSweep); the solver (Anderson) begins on a
-// lattice of a few nodes and goes on where the coarser one ended, as the slow part of the error is smooth.
+// What the solver does not resolve - the forward peak, and cells so deep that all that is seen of them lies
+// behind their face - counts as not scattered at all: the medium's extinction s becomes k s. Along a line of
+// sight that is
+//
+//   dL/ds = -k s (L - S)  =  -s (L - (k S + (1 - k) L)),
+//
+// so what the marcher, which knows s only, has to add up is k S + (1 - k) L, with L the light that already
+// goes towards the eye (scattered_towards.cpp).
 //
 // Source: discrete ordinates and short characteristics are textbook transport (Lewis and Miller,
-// "Computational Methods of Neutron Transport", 1984); so is the isotropic equivalent, the transport
-// correction.
+// "Computational Methods of Neutron Transport", 1984).
 //
-// Limits: light spreads by half a cell per slice, so where a cell is nearly opaque too much of it reaches the
-// dark side (a fifth, in a core lit from behind only) and 7 % are missing from the lit one, which the marcher
-// makes up for. Cells that would hide the light altogether are thinned.
+// Limits: light spreads by half a cell per slice, so that of a core lit from one side only too much reaches
+// the dark side, where a cell is deep. Details smaller than a cell are lit as the cell is.
 #include "nephele/render/light/scattered_light.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
-#include "nephele/render/light/detail/anderson.h"
-#include "nephele/render/light/detail/light_sweep.h"
+#include "nephele/render/light/detail/beam_samples.h"
+#include "nephele/render/light/detail/harmonics.h"
+#include "nephele/render/light/detail/lattice_point.h"
 #include "nephele/render/light/detail/scattering_lattice.h"
-#include "nephele/render/light/exp_of_minus.h"
+#include "nephele/render/light/detail/transport_solver.h"
 
 namespace nephele {
 
 namespace {
 
-constexpr int kCoarsest = 24;
-constexpr int kCoarseSweeps = 60;
-// Typical optical depth of a cell, beyond which the lattice would show.
-constexpr float kDeepestCell = 4.0f;
+// Typical optical depth of a cell, beyond which it is thinned.
+constexpr float kDeepestCell = 2.0f;
+// Nodes are asked for a cell and a quarter away from density.
+constexpr int kReach = 2;
+// Moments below this are not worth a degree.
+constexpr float kSmallMoment = 0.1f;
 
-// Where the lattices of a volume lie: a brick of nothing around it.
-struct Placement {
-  Vec3i first, bricks;
-  int factor = 1;
-
-  Placement(const RenderVolume& volume, int longestSide) {
-    const Box box = volume.indexBounds();
-    first = Vec3i(box.min * (1.0f / BrickGrid::kBrick)) - Vec3i{1, 1, 1};
-    bricks = Vec3i(box.size() * (1.0f / BrickGrid::kBrick)) + Vec3i{2, 2, 2};
-    const int longest = std::max({bricks.x, bricks.y, bricks.z}) * BrickGrid::kBrick;
-    while (factor < BrickGrid::kBrick && longest / factor > longestSide) factor *= 2;
-  }
-};
-
-detail::ScatteringLattice finestLattice(const RenderVolume& volume, const Placement& place, float extinction,
-                                        const ScatteredSource& source) {
-  const BrickGrid& grid = volume.density();
-  const int factor = place.factor, perBrick = BrickGrid::kBrick / factor;
-  detail::ScatteringLattice lattice(place.bricks * perBrick, factor);
-  const std::vector<Vec3i>& occupied = volume.occupiedBricks();
-  // The beam varies slowly enough for every other voxel where a cell has many.
-  const int stride = factor > 2 ? 2 : 1;
-  parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) {
-      const Vec3i origin = (occupied[i] - place.first) * perBrick;
-      const float* values = grid.brick(grid.poolIndex(occupied[i]));
-      for (int z = 0; z < BrickGrid::kBrick; z += stride)
-        for (int y = 0; y < BrickGrid::kBrick; y += stride)
-          for (int x = 0; x < BrickGrid::kBrick; x += stride) {
-            float rho = 0;
-            for (int k = 0; k != stride * stride * stride; ++k)
-              rho += std::max(
-                  values[sampleOffset(x + k % stride, y + k / stride % stride, z + k / (stride * stride))],
-                  0.0f);
-            if (!(rho > 0)) continue;
-            const std::size_t to =
-                lattice.index(origin.x + x / factor, origin.y + y / factor, origin.z + z / factor);
-            lattice.density[to] += rho;
-            if (!source.column) continue;
-            const Vec3f voxel = Vec3f(occupied[i] * BrickGrid::kBrick + Vec3i{x, y, z}) +
-                                Vec3f{1, 1, 1} * (0.5f * float(stride - 1));
-            const Vec3f world = grid.indexToWorld()(voxel);
-            const float depth = std::max(extinction * source.shadow * source.column(world), 0.0f);
-            lattice.beam[to] +=
-                rho * source.irradiance(world) * detail::expOfMinus(std::min(depth, 80.0f)) / (4 * kPi);
-          }
-    }
-  });
-  lattice.finish(float(factor * factor * factor));
-  return lattice;
+void check(const Scattering& scattering, const ScatteredLight::Options& options) {
+  require(options.longestSide >= 8 && options.sweeps >= 1,
+          "scattered light: needs at least 8 nodes and a sweep");
+  require(options.order == 4 || options.order == 6 || options.order == 8,
+          fmt::format("scattered light: expected directions of order 4, 6 or 8, got {}", options.order));
+  require(
+      std::isfinite(scattering.extinction) && scattering.extinction >= 0 && scattering.albedo >= 0 &&
+          scattering.albedo <= 1 && !scattering.phase.empty(),
+      fmt::format("scattered light: expected an extinction >= 0, an albedo within [0, 1] and moments of a "
+                  "phase function, got {}, {} and {} moments",
+                  scattering.extinction, scattering.albedo, scattering.phase.size()));
 }
 
 }  // namespace
 
-Scattering Scattering::isotropic() const {
-  const float g = std::max(meanCosine, 0.0f), left = 1 - albedo * g;
-  return {extinction * left, albedo * (1 - g) / left, 0.0f};
-}
-
-ScatteredSource ScatteredSource::of(const LightVolume& sun) {
+ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards) {
   ScatteredSource source;
   source.irradiance = [](const Vec3f&) { return 1.0f; };
   source.column = [&sun](const Vec3f& world) { return sun.columnDensity(world); };
+  source.towards = towards;
   return source;
 }
 
@@ -105,117 +72,142 @@ ScatteredSource ScatteredSource::evenSky() {
   return source;
 }
 
-ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& scattering,
-                               const LightVolume* sun, const Progress& progress)
-    : ScatteredLight(volume, scattering, sun, Options{}, progress) {}
-
-ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& scattering,
-                               const LightVolume* sun, const Options& options, const Progress& progress)
-    : ScatteredLight(volume, scattering, sun ? ScatteredSource::of(*sun) : ScatteredSource::evenSky(),
-                     options, progress) {}
+int ScatteredLight::Options::degree(const std::vector<float>& phase) const {
+  const int most = order == 4 ? 2 : order == 6 ? 3 : detail::kMostDegree;
+  int degree = 0;
+  while (degree < most && std::size_t(degree) + 1 < phase.size() &&
+         std::fabs(phase[std::size_t(degree) + 1]) > kSmallMoment)
+    ++degree;
+  return degree;
+}
 
 ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& scattering,
                                const ScatteredSource& source, const Options& options,
                                const Progress& progress) {
-  require(options.directions >= 6 && options.longestSide >= 8 && options.sweeps >= 1,
-          "scattered light: needs at least 6 directions, 8 nodes and a sweep");
-  require(
-      std::isfinite(scattering.extinction) && scattering.extinction >= 0 && scattering.albedo >= 0 &&
-          scattering.albedo <= 1 && std::isfinite(scattering.meanCosine) && scattering.meanCosine < 1,
-      fmt::format("scattered light: expected an extinction >= 0, an albedo within [0, 1] and a mean cosine "
-                  "below 1, got {}, {} and {}",
-                  scattering.extinction, scattering.albedo, scattering.meanCosine));
-  // Spirals that are even over the sphere.
-  std::vector<Vec3f> ways, towards;
-  for (int i = 0; i != options.directions; ++i) {
-    const float y = 1 - (2 * float(i) + 1) / float(options.directions), angle = 2.39996323f * float(i);
-    const float r = std::sqrt(1 - y * y);
-    ways.push_back({r * std::cos(angle), y, r * std::sin(angle)});
-    towards.push_back(-ways.back());
-  }
-  const std::vector<float> inflow =
-      source.sky ? source.sky(towards) : std::vector<float>(towards.size(), 0.0f);
-  float meanInflow = 0;
-  for (const float value : inflow) meanInflow += value;
-  meanInflow /= float(inflow.size());
-  values_ = {meanInflow};
-  if (volume.isEmpty()) return;
-  Scattering even = scattering.isotropic();
-
+  check(scattering, options);
   const BrickGrid& grid = volume.density();
-  const Placement place(volume, options.longestSide);
-  std::vector<detail::ScatteringLattice> levels{finestLattice(volume, place, even.extinction, source)};
-  while (levels[0].longest() > options.longestSide) levels[0] = detail::halved(levels[0]);
-  size_ = levels[0].size;
-  const int factor = levels[0].factor;
-  const float scale = 1.0f / float(factor);
-  const Vec3f middle = Vec3f(place.first * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * float(factor - 1));
+  const int degree = options.degree(scattering.phase);
+  detail::TransportSolver::Medium medium;
+  medium.ordinates = detail::levelSymmetric(options.order);
+  medium.inflow.assign(medium.ordinates.size(), 0.0f);
+  if (source.sky) {
+    std::vector<Vec3f> towards;
+    for (const detail::Ordinate& ordinate : medium.ordinates)
+      towards.push_back(normalize(grid.indexToWorld().linear * -ordinate.way));
+    medium.inflow = source.sky(towards);
+  }
+  sky_.assign(std::size_t(detail::momentCount(degree)), 0.0f);
+  for (std::size_t i = 0; i != medium.ordinates.size(); ++i) {
+    float y[detail::kMostMoments];
+    detail::harmonics(medium.ordinates[i].way, degree, y);
+    for (std::size_t m = 0; m != sky_.size(); ++m)
+      sky_[m] += medium.ordinates[i].weight * medium.inflow[i] * y[m];
+  }
+  moments_ = sky_;
+  beam_ = density_ = {0.0f};
+  near_ = {1};
+  if (volume.isEmpty()) return;
+
+  const SmoothScattering smooth(scattering.phase, scattering.albedo, degree);
+  albedo_ = smooth.albedo;
+  phase_ = smooth.moments;
+  const detail::LatticePlacement place(volume, options.longestSide);
+  detail::ScatteringLattice lattice = place.lattice();
+  detail::sampleDensity(volume, place, lattice);
+  const float perDensity = scattering.extinction * smooth.share * grid.voxelSize() * float(place.factor),
+              deepest = perDensity * detail::typicalDensity(lattice);
+  smoothShare_ = smooth.share;
+  share_ = smooth.share * (deepest > kDeepestCell ? kDeepestCell / deepest : 1.0f);
+  detail::sampleBeam(volume, place, source, scattering.extinction * share_, lattice);
+  if (source.glow)
+    for (float& value : lattice.beam) value /= share_ * std::max(albedo_, 1e-6f);
+  while (lattice.longest() >= options.longestSide + detail::ScatteringLattice::kRow)
+    lattice = detail::halved(lattice);
+
+  size_ = lattice.size;
+  const float scale = 1.0f / float(lattice.factor);
+  const Vec3f middle =
+      Vec3f(place.firstBrick * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * float(lattice.factor - 1));
   worldToLattice_ = {Mat3f::scaling(scale) * grid.worldToIndex().linear,
                      (grid.worldToIndex().translation - middle) * scale};
-  const float deepest = grid.voxelSize() * float(factor) * detail::typicalDensity(levels[0]);
-  if (deepest * even.extinction > kDeepestCell) even.extinction = kDeepestCell / deepest;
-  // Without scattering one sweep tells all.
-  if (even.albedo > 0)
-    while (levels.back().longest() > kCoarsest) levels.push_back(detail::halved(levels.back()));
+  depthPerDensity_ = scattering.extinction * share_ * grid.voxelSize() * float(lattice.factor);
+  if (source.towards) towards_ = normalize(worldToLattice_.linear * *source.towards);
+  if (source.place) place_ = worldToLattice_(*source.place);
 
-  for (std::size_t level = levels.size(); level-- != 0;) {
-    const detail::ScatteringLattice& lattice = levels[level];
-    std::vector<Vec3f> directions;
-    for (const Vec3f& way : ways)
-      directions.push_back(grid.worldToIndex().linear * way * (1.0f / float(lattice.factor)));
-    detail::LightSweep sweeper(lattice, even.extinction, inflow, directions);
-    detail::Anderson anderson(lattice.density);
-    std::vector<float> light = level + 1 == levels.size()
-                                   ? std::vector<float>(lattice.density.size(), meanInflow)
-                                   : detail::refined(values_, levels[level + 1], lattice);
-    std::vector<float> own(light.size());
-    const int most = level == 0 ? options.sweeps : kCoarseSweeps;
-    for (int sweep = 1;; ++sweep) {
-      progress.check();
-      for (std::size_t i = 0; i != light.size(); ++i) own[i] = even.albedo * (light[i] + lattice.beam[i]);
-      sweeper.sweep(own, values_);
-      if (sweep == most || even.albedo == 0 || anderson.step(light, values_) < options.tolerance) break;
-      if (level == 0) progress.advance(double(sweep) / most);
+  medium.extinction = depthPerDensity_;
+  medium.phase = phase_;
+  for (float& value : medium.phase) value *= albedo_;
+  detail::TransportSolver solver(std::move(lattice), std::move(medium));
+  moments_ = solver.solve(
+      sky_,
+      [&](const detail::ScatteringLattice& level, float wider, std::vector<float>& light) {
+        addBeam(light, level.size, level.beam, wider);
+      },
+      {options.sweeps, options.tolerance}, progress);
+  sweeps_ = solver.sweeps();
+  residual_ = solver.residual();
+  near_ = detail::surroundings(solver.finest(), kReach);
+  beam_ = std::move(solver.finest().beam);
+  density_ = std::move(solver.finest().density);
+}
+
+Vec3f ScatteredLight::wayOfBeam(const Vec3f& node) const {
+  if (towards_) return -*towards_;
+  const Vec3f way = node - *place_;
+  const float far = length(way);
+  return far > 0 ? way * (1 / far) : Vec3f{0, 0, 1};
+}
+
+// Adds the moments of the beam to those of a lattice whose cells are so many times wider.
+void ScatteredLight::addBeam(std::vector<float>& moments, const Vec3i& size, const std::vector<float>& beam,
+                             float wider) const {
+  const std::size_t cells = beam.size(), count = hasWay() ? moments.size() / cells : 1;
+  const int degree = int(phase_.size()) - 1;
+  const std::size_t nx = std::size_t(size.x), ny = std::size_t(size.y);
+  parallelFor(std::size_t(size.z), 1, [&](std::size_t begin, std::size_t end) {
+    float own[detail::kMostMoments] = {1.0f};
+    if (towards_) detail::harmonics(-*towards_, degree, own);
+    for (std::size_t i = begin * nx * ny; i != end * nx * ny; ++i) {
+      if (beam[i] == 0) continue;
+      if (place_) {
+        const float half = 0.5f * (wider - 1);
+        const Vec3f node{float(i % nx), float(i / nx % ny), float(i / nx / ny)};
+        detail::harmonics(wayOfBeam(node * wider + Vec3f{half, half, half}), degree, own);
+      }
+      for (std::size_t m = 0; m != count; ++m) moments[m * cells + i] += own[m] * beam[i];
     }
-  }
-  if (source.sky) {
-    const float most = *std::max_element(inflow.begin(), inflow.end());
-    for (float& value : values_) value = std::min(value, most);
-  }
+  });
 }
 
-void ScatteredLight::scale(float factor) {
-  for (float& value : values_) value *= factor;
+std::vector<float> ScatteredLight::mean() const {
+  const std::size_t cells = beam_.size();
+  std::vector<float> result(moments_.begin(), moments_.begin() + std::ptrdiff_t(cells));
+  for (std::size_t i = 0; i != cells; ++i) result[i] -= beam_[i];
+  return result;
 }
 
-float ScatteredLight::at(const Vec3f& world) const {
-  const Vec3f p = worldToLattice_(world);
-  Vec3i cell;
-  Vec3f f;
-  for (int axis = 0; axis != 3; ++axis) {
-    const float x = std::clamp(p[axis], 0.0f, float(size_[axis] - 1));
-    cell[axis] = std::min(int(x), std::max(size_[axis] - 2, 0));
-    f[axis] = x - float(cell[axis]);
-  }
-  float sum = 0;
-  for (int corner = 0; corner != 8; ++corner) {
-    const Vec3i d{corner & 1, corner >> 1 & 1, corner >> 2};
-    const Vec3i node = min(cell + d, size_ - Vec3i{1, 1, 1});
-    sum += (d.x ? f.x : 1 - f.x) * (d.y ? f.y : 1 - f.y) * (d.z ? f.z : 1 - f.z) *
-           values_[(std::size_t(node.z) * std::size_t(size_.y) + std::size_t(node.y)) * std::size_t(size_.x) +
-                   std::size_t(node.x)];
-  }
-  return sum;
+float ScatteredLight::meanAt(const Vec3f& world) const {
+  return detail::LatticePoint(size_, worldToLattice_(world)).of(mean().data());
 }
 
-ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, int longestSide) {
+// Cells are typically no denser than voxels.
+float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options& options) {
+  if (volume.isEmpty()) return 0;
+  return kDeepestCell /
+         (volume.density().voxelSize() * float(detail::LatticePlacement(volume, options.longestSide).factor) *
+          volume.typicalDensity());
+}
+
+ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
-  const Placement place(volume, longestSide);
-  const double perBrick = double(BrickGrid::kBrick) / place.factor;
-  const double nodes =
-      double(place.bricks.x) * place.bricks.y * place.bricks.z * perBrick * perBrick * perBrick;
-  // Two arrays of the lattice, twelve of the sweeps, twelve of the acceleration, and the light itself.
-  return {30.0 * sizeof(float) * nodes, sizeof(float) * nodes};
+  const Vec3i size = detail::LatticePlacement(volume, options.longestSide).lattice().size;
+  const double nodes = double(size.x) * size.y * size.z,
+               moments = detail::momentCount(options.order == 4   ? 2
+                                             : options.order == 6 ? 3
+                                                                  : detail::kMostDegree);
+  // Moments: the light, swept and turned, and the acceleration's; beside them what the sweeps know of every
+  // cell.
+  return {(9 * moments + 40) * sizeof(float) * nodes, (moments + 3) * sizeof(float) * nodes};
 }
 
 }  // namespace nephele

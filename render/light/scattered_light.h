@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/light/light_volume.h"
+#include "nephele/render/light/phase_expansion.h"
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele {
@@ -13,76 +16,117 @@ namespace nephele {
 struct Scattering {
   float extinction = 1.0f;
   float albedo = 1.0f;
-  /// Of the phase function; below 0 counts as 0.
-  float meanCosine = 0.0f;
-
-  /// Share g of what is scattered goes on as before: extinction * (1 - albedo g) and albedo (1 - g) / (1 -
-  /// albedo g) scatter alike in all directions and transport as much light.
-  Scattering isotropic() const;
+  /// See legendreMoments; those that are missing count as 0.
+  std::vector<float> phase{1.0f};
 };
 
-/// Where light comes from: a beam through the volume, or the sky around it.
+/// Where light comes from: a beam through the volume, the sky around it, or what glows in it.
 struct ScatteredSource {
   /// Irradiance of the beam at a world-space point without the volume, and the density on its way there.
   std::function<float(const Vec3f&)> irradiance, column;
   /// Multiplies the extinction on that way.
   float shadow = 1.0f;
-  /// Radiance of the sky in each of some unit directions, which stand for equal shares of the sphere.
+  /// Where the beam comes from: a direction towards it, or a place.
+  std::optional<Vec3f> towards, place;
+  /// Radiance of the sky in each of some unit directions, which stand for about equal shares of the sphere.
   std::function<std::vector<float>(const std::vector<Vec3f>&)> sky;
+  /// Radiance per optical depth of what glows at a point; then there is no beam.
+  std::function<float(const Vec3f&)> glow;
 
   /// A light of irradiance 1 everywhere, whose column densities are `sun`.
-  static ScatteredSource of(const LightVolume& sun);
+  static ScatteredSource of(const LightVolume& sun, const Vec3f& towards);
   /// A sky of radiance 1.
   static ScatteredSource evenSky();
 };
 
-/// Light that has been scattered, mean over all directions, on a coarse lattice.
+/// From where a volume is looked at: a place, or the way of all rays.
+struct Viewpoint {
+  std::optional<Vec3f> place, forward;
+};
+
+/// Light in a volume by discrete ordinates, as moments over all directions, on a coarse lattice.
 ///
-/// Solves  J(x) = mean over directions of the light that arrives at x of  albedo (J + beam)  all over the
-/// volume, for the isotropic equivalent of a Scattering; beam = irradiance * exp(-extinction c) / (4 pi), c
-/// the density between a point and the light. So J is the mean radiance of scattered light for a beam, or of
-/// all light for a sky, then at most the sky's largest.
+/// The transport equation is solved in a medium without forward peak (SmoothScattering), whose cells are
+/// thinned where they are nearly opaque: what is thinned away counts as light that goes on as before, for the
+/// beam and for what becomes of it alike, so that no light is lost.
 class ScatteredLight {
  public:
   struct Options {
     /// Nodes along the longest side, at most.
     int longestSide = 128;
-    int directions = 24;
-    /// Sweeps over the finest lattice, at most; they end where one changes J by less than `tolerance`.
+    /// Of the directions: 4, 6 or 8, see levelSymmetric. Moments are kept up to a degree of 2, 3 or 5, where
+    /// the phase function has so many.
+    int order = 6;
+    /// Sweeps over the finest lattice, at most; they end where the light is within `tolerance` of what it
+    /// becomes, by what the last one changed.
     int sweeps = 16;
     float tolerance = 1.5e-3f;
+
+    /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
+    /// of the directions.
+    int degree(const std::vector<float>& phase) const;
   };
 
-  /// Light of a sun whose column densities are `sun`, or of a sky of radiance 1 if that is null.
-  /// Cost: some 8 sweeps, each directions * nodes. @throws Error if an option is too small to be useful or
-  /// `scattering` is outside its range.
-  ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const LightVolume* sun,
-                 const Progress& progress = silent());
-  ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const LightVolume* sun,
-                 const Options& options, const Progress& progress = silent());
+  /// Cost: some 4 sweeps, each directions * nodes. @throws Error if an option is not useful or `scattering`
+  /// is outside its range.
   ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const ScatteredSource& source,
                  const Options& options, const Progress& progress = silent());
+  ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const ScatteredSource& source,
+                 const Progress& progress = silent())
+      : ScatteredLight(volume, scattering, source, Options{}, progress) {}
 
   /// From world space to this lattice, whose nodes are the integers from 0 on: the same for all of a volume.
   const Affine& worldToLattice() const { return worldToLattice_; }
   Vec3i size() const { return size_; }
-  /// First axis fastest.
-  const std::vector<float>& values() const { return values_; }
-  /// Multiplies all values.
-  void scale(float factor);
-  /// J at a world-space point, clamped to the lattice. Slow; for tests.
-  float at(const Vec3f& world) const;
+  /// Mean over all directions of the light that was scattered, and of the sky's that was not: of every node
+  /// that density is near. First axis fastest.
+  std::vector<float> mean() const;
+  /// The same at a world-space point, clamped to the lattice. Slow; for tests.
+  float meanAt(const Vec3f& world) const;
+
+  /// What every node sends towards a viewpoint, per optical depth of the medium itself, of all light but the
+  /// beam (ForwardLight has what becomes of that) and what glows. Cost: a march of some ten steps per node.
+  /// Uses all cores.
+  std::vector<float> towards(const Viewpoint& viewpoint) const;
+
+  /// Over the finest lattice, and an estimate of the relative error that they left.
+  int sweeps() const { return sweeps_; }
+  float residual() const { return residual_; }
+
+  /// Cells are never thinned so far that density 1 has less extinction than this.
+  static float leastExtinction(const RenderVolume& volume, const Options& options);
 
   /// Bytes held while it is made, and afterwards.
   struct Bytes {
     double working = 0, kept = 0;
   };
-  static Bytes estimateBytes(const RenderVolume& volume, int longestSide = 128);
+  static Bytes estimateBytes(const RenderVolume& volume, const Options& options);
+  static Bytes estimateBytes(const RenderVolume& volume) { return estimateBytes(volume, Options{}); }
 
  private:
+  struct Nodes;
+
+  void addBeam(std::vector<float>& moments, const Vec3i& size, const std::vector<float>& beam,
+               float wider) const;
+  Vec3f wayOfBeam(const Vec3f& node) const;
+  bool hasWay() const { return towards_ || place_; }
+  void sharpen(std::vector<float>& values) const;
+
   Affine worldToLattice_;
   Vec3i size_{1, 1, 1};
-  std::vector<float> values_;
+  // The solver's extinction over the medium's, and what it was before cells were thinned; its albedo, the
+  // optical depth of a cell of density 1, and the moments of its phase function.
+  float share_ = 1, smoothShare_ = 1, albedo_ = 1, depthPerDensity_ = 0;
+  std::vector<float> phase_{1.0f};
+  // As in ScatteredSource, in the lattice.
+  std::optional<Vec3f> towards_, place_;
+  // Moments of the light around the volume.
+  std::vector<float> sky_;
+  // Moments of the light at every node, beam and all; the beam alone; the density; nodes near density.
+  std::vector<float> moments_, beam_, density_;
+  std::vector<std::uint8_t> near_;
+  int sweeps_ = 0;
+  float residual_ = 0;
 };
 
 }  // namespace nephele

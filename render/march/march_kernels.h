@@ -33,7 +33,7 @@ struct MarchRay {
   float cosine = 1.0f;
   /// Where in its step a sample is taken, in [0, 1).
   float jitter = 0.5f;
-  /// Weight of every octave of every sun: phase, contribution and albedo, per colour.
+  /// Weight of every term of every sun (ForwardLight) times albedo, per colour.
   float weight[MarchScene::kMostSuns][3][MarchScene::kMostOctaves];
   HoldoutCurve holdout{};
   /// Something opaque is at the end, so that the last step must not reach beyond it.

@@ -31,8 +31,8 @@ struct PathOptions : FrameOptions {
   bool objectsScatter = true;
 };
 
-/// The same picture as renderImage with all scattering, without bias and with noise: what the marcher and its
-/// octaves are judged against.
+/// The same picture as renderImage with all scattering, without bias and with noise: what the marcher is
+/// judged against.
 ///
 /// Free paths by delta tracking, light from the suns at every scattering by ratio tracking, the sky where a
 /// scattered path leaves. The density is the marcher's, interpolated linearly; alpha is the share of paths

@@ -1,4 +1,4 @@
-// A sweep of light maps J to K(albedo (J + beam)), and J is its fixed point, reached by Anderson's
+// A sweep of light maps x to g(x), and the light is its fixed point, reached by Anderson's
 // acceleration (1965) with a memory of a few sweeps: where a plain iteration needs a sweep per scattering, a
 // hundred and more in a cloud, this takes some eight.
 #include "nephele/render/light/detail/anderson.h"
@@ -11,23 +11,23 @@
 namespace nephele::detail {
 
 float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
-  const std::size_t n = x.size();
-  if (!lastX_.empty()) {
-    if (dx_.size() == kMemory) {
-      std::rotate(dx_.begin(), dx_.begin() + 1, dx_.end());
+  const std::size_t n = weights_.size();
+  constexpr std::size_t piece = 1 << 15;
+  if (!lastG_.empty()) {
+    if (dg_.size() == kMemory) {
+      std::rotate(dg_.begin(), dg_.begin() + 1, dg_.end());
       std::rotate(df_.begin(), df_.begin() + 1, df_.end());
     } else {
-      dx_.emplace_back(n), df_.emplace_back(n);
+      dg_.emplace_back(x.size()), df_.emplace_back(n);
     }
   }
-  const std::size_t m = dx_.size();
-  constexpr std::size_t piece = 1 << 15;
+  const std::size_t m = dg_.size();
   std::vector<Products> pieces((n + piece - 1) / piece);
   parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p != end; ++p)
       for (std::size_t i = p * piece; i != std::min(n, (p + 1) * piece); ++i) {
         const float f = g[i] - x[i], weight = weights_[i];
-        if (m > 0) dx_[m - 1][i] = x[i] - lastX_[i], df_[m - 1][i] = f - lastF_[i];
+        if (m > 0) df_[m - 1][i] = f - lastF_[i];
         if (weight == 0) continue;
         Products& sums = pieces[p];
         for (std::size_t r = 0; r != m; ++r) {
@@ -35,8 +35,6 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
           for (std::size_t c = 0; c != m; ++c) sums[r * kColumns + c] += double(mine * df_[c][i]);
           sums[r * kColumns + kMemory] += double(mine * f);
         }
-        sums[kMemory * kColumns] += double(weight * std::fabs(f));
-        sums[kMemory * kColumns + 1] += double(weight * g[i]);
       }
   });
   // Added in a fixed order, so that the sums do not depend on the threads.
@@ -45,18 +43,28 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
     for (std::size_t k = 0; k != a.size(); ++k) a[k] += sums[k];
   const std::array<double, kMemory> share = solve(a, m);
 
-  lastX_ = x;
+  const bool isFirst = lastG_.empty();
   lastF_.resize(n);
-  parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin * piece; i != std::min(n, end * piece); ++i) {
-      lastF_[i] = g[i] - x[i];
+  lastG_.resize(x.size());
+  std::vector<std::array<double, 2>> changes(pieces.size());
+  parallelFor((x.size() + piece - 1) / piece, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin * piece; i != std::min(x.size(), end * piece); ++i) {
+      if (!isFirst) dg_[m - 1][i] = g[i] - lastG_[i];
       float next = g[i];
-      for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * (dx_[r][i] + df_[r][i]);
-      x[i] = std::max(next, 0.0f);
+      for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * dg_[r][i];
+      lastG_[i] = g[i];
+      if (i < n) {
+        lastF_[i] = g[i] - x[i];
+        std::array<double, 2>& sums = changes[i / piece];
+        sums[0] += double(weights_[i] * std::fabs(next - x[i]));
+        sums[1] += double(weights_[i] * std::fabs(next));
+      }
+      x[i] = next;
     }
   });
-  const double whole = a[kMemory * kColumns + 1];
-  return whole > 0 ? float(a[kMemory * kColumns] / whole) : 0.0f;
+  double change = 0, whole = 0;
+  for (const auto& sums : changes) change += sums[0], whole += sums[1];
+  return whole > 0 ? float(change / whole) : 0.0f;
 }
 
 // Least squares by the normal equations, a little damped.
@@ -72,7 +80,8 @@ std::array<double, Anderson::kMemory> Anderson::solve(Products a, std::size_t m)
   for (std::size_t r = m; r-- != 0;) {
     double rest = a[r * kColumns + kMemory];
     for (std::size_t c = r + 1; c != m; ++c) rest -= a[r * kColumns + c] * result[c];
-    result[r] = a[r * kColumns + r] > 0 ? rest / a[r * kColumns + r] : 0;
+    // A few digits are enough; with all of them the rounding of sums would come back a hundredfold.
+    result[r] = a[r * kColumns + r] > 0 ? std::round(1024 * rest / a[r * kColumns + r]) / 1024 : 0;
   }
   return result;
 }

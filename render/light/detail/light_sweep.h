@@ -1,69 +1,97 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
+#include "nephele/render/light/detail/harmonics.h"
 #include "nephele/render/light/detail/scattering_lattice.h"
 
 namespace nephele::detail {
 
-/// A copy of lattice values whose slowest axis is `last`.
-struct TurnedLattice {
-  Vec3i order, size;
-  std::size_t stride[3];
-  std::vector<float> values;
-
-  TurnedLattice(const Vec3i& n, int last)
-      : order(last == 0   ? Vec3i{1, 2, 0}
-              : last == 1 ? Vec3i{0, 2, 1}
-                          : Vec3i{0, 1, 2}),
-        size{n[order.x], n[order.y], n[order.z]},
-        values(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z)) {
-    const std::size_t plain[3] = {1, std::size_t(n.x), std::size_t(n.x) * std::size_t(n.y)};
-    for (int axis = 0; axis != 3; ++axis) stride[axis] = plain[order[axis]];
-  }
-  std::size_t row(int y, int z) const {
-    return (std::size_t(z) * std::size_t(size.y) + std::size_t(y)) * std::size_t(size.x);
-  }
-  void take(const std::vector<float>& from) {
-    for (int z = 0; z != size.z; ++z)
-      for (int y = 0; y != size.y; ++y) {
-        const float* at = from.data() + std::size_t(z) * stride[2] + std::size_t(y) * stride[1];
-        float* to = values.data() + row(y, z);
-        for (int x = 0; x != size.x; ++x) to[x] = at[std::size_t(x) * stride[0]];
-      }
-  }
-  void addTo(std::vector<float>& sum, float share, int beginY, int endY) const {
-    for (int z = 0; z != size.z; ++z)
-      for (int y = beginY; y < endY; ++y) {
-        float* at = sum.data() + std::size_t(z) * stride[2] + std::size_t(y) * stride[1];
-        const float* from = values.data() + row(y, z);
-        for (int x = 0; x != size.x; ++x) at[std::size_t(x) * stride[0]] += share * from[x];
-      }
-  }
+/// What carries light through a slice of a lattice in four directions that differ in signs alone.
+struct SliceWork {
+  /// Cells of a row, and rows.
+  int width = 0, rowBegin = 0, rowEnd = 0;
+  std::size_t rowStride = 0;
+  /// Of the first row: share that a cell takes of what comes in, and what it holds on average of that.
+  const float *taken = nullptr, *mean = nullptr;
+  /// The same of what the cell's own light grows by on the way through it.
+  const float *takenSlope = nullptr, *meanSlope = nullptr;
+  /// Slopes of the first moment along the row, from row to row and from slice to slice, per cell.
+  const float* slopes[3] = {};
+  /// Moments of the light that is scattered, and of the sum; one moment after `momentStride` floats.
+  const float* moments = nullptr;
+  float* sums = nullptr;
+  std::size_t momentStride = 0;
+  int momentCount = 1;
+  /// Cells of every row that hold something or are asked for, whole vectors.
+  const std::array<std::uint16_t, 2>* active = nullptr;
+  std::size_t activeStride = 1;
+  struct Way {
+    /// The slice before at the first of four cells that light comes in from, and this slice.
+    const float* before;
+    float* here;
+    float shares[4];
+    /// Of the way through a cell, times the phase function's first moment.
+    float slopes[3];
+  } ways[4];
+  std::size_t planeStride = 0;
+  /// Per moment and direction.
+  float source[kMostMoments][4], sum[kMostMoments][4];
 };
+
+void carrySlice(const SliceWork& work);
 
 /// Carries light through one lattice in all directions.
 class LightSweep {
  public:
-  /// `inflow`: what comes in along each of the directions.
-  LightSweep(const ScatteringLattice& lattice, float extinction, const std::vector<float>& inflow,
-             const std::vector<Vec3f>& directions);
+  /// `extinction`: per density and cell. `phase`: moments of the phase function times albedo, up to a degree.
+  /// `inflow`: what comes in along each of the ordinates. `needed`: cells whose moments are wanted beside
+  /// those with density. All must outlive it but `needed` and `phase`.
+  LightSweep(const ScatteringLattice& lattice, float extinction, const std::vector<float>& phase,
+             const std::vector<Ordinate>& ordinates, const std::vector<float>& inflow,
+             const std::vector<std::uint8_t>& needed);
 
-  /// Mean over directions of the light in every cell, whose own light is `source` per optical depth.
-  void sweep(const std::vector<float>& source, std::vector<float>& mean);
+  /// Moments of the light in every cell that is needed, given those of the light that is scattered; moment m
+  /// of cell i is at m * cells + i. Nothing comes in unless `hasInflow`.
+  void sweep(const std::vector<float>& moments, std::vector<float>& result, bool hasInflow = true);
 
  private:
-  struct Way {
-    Vec3f direction;
-    float inflow;
+  // The lattice as it lies, or turned so that x is the slowest axis.
+  struct Layout {
+    Vec3i size;
+    std::vector<std::vector<float>> taken, mean, takenSlope, meanSlope;
+    std::vector<float> slopes[3];
+    // Of rows along the first axis.
+    std::vector<std::array<std::uint16_t, 2>> active;
+  };
+  // Four directions: a cell's path, how far light moves sideways per slice, and their ordinates.
+  struct Group {
+    int axis;
+    bool rises;
+    std::size_t length;
+    std::array<std::size_t, 4> ordinates;
   };
 
-  // `d`: the way of the light in cells per world unit.
-  void carry(const Vec3f& d, float inflow, std::size_t axis, TurnedLattice& sum) const;
+  void addLayout(const std::vector<float>& density, const std::vector<std::uint8_t>& needed,
+                 const Vec3i& size, Layout& layout) const;
+  void findSlopes(const std::vector<float>& moments);
+  void carry(const Group& group, const std::vector<float>& moments, std::vector<float>& sums,
+             bool hasInflow) const;
 
-  float share_;
-  std::vector<TurnedLattice> extinction_, source_, sums_;
-  std::vector<Way> passes_[6];
+  const ScatteringLattice& lattice_;
+  float extinction_;
+  const std::vector<Ordinate>& ordinates_;
+  const std::vector<float>& inflow_;
+  std::size_t momentCount_;
+  float scattered_;
+  std::vector<float> lengths_;
+  std::vector<Group> groups_;
+  Layout plain_, turned_;
+  std::vector<std::array<float, kMostMoments>> sources_, sums_;
+  // Sums of the directions along x and y, added to those along z in a fixed order.
+  std::vector<float> turnedMoments_, turnedSums_, sidewaysSums_;
 };
 
 }  // namespace nephele::detail

@@ -26,6 +26,21 @@ MarchScene Picture::withoutLight(MarchScene scene) {
   return scene;
 }
 
+namespace {
+
+// Of the middle of the shutter.
+Viewpoint viewpointOf(const Camera& camera) {
+  const Camera middle = camera.stillAt(0.5);
+  Viewpoint viewpoint;
+  if (middle.isOrthographic())
+    viewpoint.forward = Vec3f(middle.forward());
+  else
+    viewpoint.place = Vec3f(middle.position());
+  return viewpoint;
+}
+
+}  // namespace
+
 Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOptions& options,
                  const Film& film)
     : lit_(lit),
@@ -34,7 +49,9 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
       motion_(scene.volumeMotion),
       blurred_(scene.isBlurred()),
       pattern_(pixelPattern(options.samples, options.seed)),
-      scene_(lit.scene) {
+      scene_(lit.scene),
+      viewLight_(lit, viewpointOf(camera_)) {
+  viewLight_.bind(scene_);
   scene_.step = options.step.value_or(lit.voxelSize);
   scene_.uniformStep = options.step.value_or(4 * lit.voxelSize);
   // Beside a near light what is seen varies where the density does not.
@@ -105,20 +122,16 @@ bool Picture::prepare(const Ray& ray, const DepthBounds::Range& reach, const Sub
   const Vec3d besideEntry = entry + Vec3d(lit_.source->density().indexToWorld().linear * beside);
   out.density.origin += beside;
   if (lit_.toScattered) {
-    out.scattered = lit_.toScattered->ray(entry + ray.direction * double(lit_.lookAhead), ray.direction);
+    out.scattered = lit_.toScattered->ray(entry, ray.direction);
     out.scattered.origin += sub.lattice;
   }
   for (std::size_t sun = 0; sun != lit_.toSun.size(); ++sun) {
     out.suns[sun] = lit_.toSun[sun].ray(besideEntry, ray.direction);
     // Light travels away from the sun, then back along the ray.
     const float cosine = float(dot(lit_.directions[sun], ray.direction));
-    // Every octave less what the one before it sees.
-    float phase = lit_.phases[0](cosine);
     for (int n = 0; n != scene_.octaves; ++n) {
-      const float next = n + 1 < scene_.octaves ? lit_.phases[std::size_t(n + 1)](cosine) : 0.0f;
-      for (int c = 0; c != scene_.colours; ++c)
-        out.weight[sun][c][n] = lit_.medium.albedo[c] * (phase - next);
-      phase = next;
+      const float weight = lit_.forward.weight(n, cosine);
+      for (int c = 0; c != scene_.colours; ++c) out.weight[sun][c][n] = lit_.medium.albedo[c] * weight;
     }
   }
   for (std::size_t i = 0; i != lit_.toLocal.size(); ++i) {

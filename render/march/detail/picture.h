@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nephele/render/light/baked_light.h"
+#include "nephele/render/light/view_light.h"
 #include "nephele/render/march/detail/deep_pixel.h"
 #include "nephele/render/march/field_march.h"
 #include "nephele/render/march/film.h"
@@ -84,6 +85,7 @@ class Picture {
   // None for rays that are spread over a lens or over time.
   std::optional<DepthBounds> bounds_;
   MarchScene scene_;
+  ViewLight viewLight_;
   // Null where the density is a grid.
   const FieldDensity* field_ = nullptr;
   FieldSteps fieldSteps_;

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include "nephele/modeling/base/math.h"
+
+namespace nephele::detail {
+
+/// A place between the nodes of a dense lattice, clamped to it.
+struct LatticePoint {
+  std::size_t first, steps[3];
+  Vec3f share;
+
+  LatticePoint(const Vec3i& size, const Vec3f& p) : first(0) {
+    const std::size_t strides[3] = {1, std::size_t(size.x), std::size_t(size.x) * std::size_t(size.y)};
+    for (int axis = 0; axis != 3; ++axis) {
+      const float x = std::clamp(p[axis], 0.0f, float(size[axis] - 1));
+      const int low = std::min(int(x), std::max(size[axis] - 2, 0));
+      share[axis] = x - float(low);
+      steps[axis] = size[axis] > 1 ? strides[axis] : 0;
+      first += std::size_t(low) * strides[axis];
+    }
+  }
+  /// Between the values of the nodes.
+  float of(const float* values) const {
+    const float* at = values + first;
+    const auto edge = [&](std::size_t n) { return at[n] + share.x * (at[n + steps[0]] - at[n]); };
+    const auto face = [&](std::size_t n) { return edge(n) + share.y * (edge(n + steps[1]) - edge(n)); };
+    return face(0) + share.z * (face(steps[2]) - face(0));
+  }
+};
+
+}  // namespace nephele::detail

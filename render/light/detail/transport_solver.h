@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "nephele/modeling/base/progress.h"
+#include "nephele/render/light/detail/harmonics.h"
+#include "nephele/render/light/detail/light_sweep.h"
+#include "nephele/render/light/detail/scattering_lattice.h"
+
+namespace nephele::detail {
+
+/// Finds the light x = K x + b in a lattice, K a LightSweep and b the light of a first source, as moments.
+class TransportSolver {
+ public:
+  struct Medium {
+    /// Per density and cell of the finest lattice.
+    float extinction = 1;
+    /// Moments of the phase function times albedo, up to a degree.
+    std::vector<float> phase;
+    std::vector<Ordinate> ordinates;
+    /// What comes in along each of the ordinates.
+    std::vector<float> inflow;
+  };
+  /// Adds b to moments of a lattice whose cells are so many times wider than the finest ones.
+  using AddFirst = std::function<void(const ScatteringLattice&, float, std::vector<float>&)>;
+
+  TransportSolver(ScatteringLattice finest, Medium medium);
+
+  /// Ends where an estimate of the relative error is below `tolerance`, or after so many sweeps of the finest
+  /// lattice.
+  struct Limits {
+    int sweeps;
+    float tolerance;
+  };
+  /// `guess`: moments of the light to begin with, the same everywhere.
+  std::vector<float> solve(const std::vector<float>& guess, const AddFirst& addFirst, const Limits& limits,
+                           const Progress& progress);
+
+  ScatteringLattice& finest() { return levels_[0].lattice; }
+  int sweeps() const { return sweeps_; }
+  float residual() const { return residual_; }
+
+ private:
+  struct Level {
+    ScatteringLattice lattice;
+    std::unique_ptr<LightSweep> sweep;
+  };
+
+  void iterate(std::size_t level, std::vector<float>& light,
+               const std::function<void(std::vector<float>&)>& add, bool hasInflow, const Limits& limits,
+               const Progress& progress);
+  void addCoarse(std::size_t level, const std::vector<float>& light, std::vector<float>& swept,
+                 const Progress& progress);
+
+  Medium medium_;
+  std::vector<Level> levels_;
+  std::size_t moments_;
+  int sweeps_ = 0;
+  float residual_ = 0;
+};
+
+}  // namespace nephele::detail
