@@ -60,7 +60,7 @@ class ScatteredLight {
     /// Sweeps over the finest lattice, at most; they end where the light is within `tolerance` of what it
     /// becomes, by what the last one changed.
     int sweeps = 16;
-    float tolerance = 1.5e-3f;
+    float tolerance = 2e-3f;
 
     /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
     /// of the directions.

@@ -14,10 +14,10 @@ namespace nephele::detail {
 
 namespace {
 
-// Samples of the density, in voxels from one to the next: so many that a cell has four along each axis, or
-// two where it is a voxel.
+// Voxels from one sample to the next: two samples per voxel where a cell is hardly more than one; otherwise
+// every other voxel, where a sample between voxels is the mean of eight.
 float spacingOf(int factor) {
-  return factor <= 2 ? 0.5f : 0.25f * float(factor);
+  return factor <= 2 ? 0.5f : 2.0f;
 }
 
 // Mean of what is left of a beam along a sample of optical depth `depth`, whose middle it sees through
