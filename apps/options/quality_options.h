@@ -15,15 +15,17 @@ struct QualityChoices {
   float adaptiveThreshold;
   /// Of the path tracer.
   int pathsPerPixel;
+  /// Octaves::order: the light is solved for in 24, 48 or 80 directions.
+  int lightOrder;
 
   static constexpr QualityChoices of(Quality quality) {
     switch (quality) {
       case Quality::draft:
-        return {1, 16, 2.0f, 0.1f, 16};
+        return {1, 16, 2.0f, 0.1f, 16, 4};
       case Quality::final:
-        return {16, 256, 0.5f, 0.0f, 1024};
+        return {16, 256, 0.5f, 0.0f, 1024, 8};
       default:
-        return {4, 64, 1.0f, 0.0f, 64};
+        return {4, 64, 1.0f, 0.0f, 64, 6};
     }
   }
 };

@@ -89,8 +89,13 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   addChoice<Quality>(
       app, "--quality", options.quality,
       {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
-      "Sets --samples, --step, --adaptive and --spp together, for a first look, a picture, or the last "
-      "one; each of them still says more where it is given.");
+      "Sets --samples, --step, --adaptive, --spp and --light-quality together, for a first look, a picture, "
+      "or the last one; each of them still says more where it is given.");
+  addChoice<std::optional<Quality>>(
+      app, "--light-quality", options.lightQuality,
+      {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
+      "Directions in which scattered light is solved for: 24, 48 or 80. Time and memory grow with them.")
+      ->default_str("as --quality");
   addLength(app, "--step", options.step, "Longest step along a ray.", Sign::positive)
       ->default_str("one voxel");
   addCount(app, "--samples", options.render.samples, 1, 4096, "Rays per pixel.")
@@ -154,6 +159,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostB
 
 void PictureOptions::chooseByQuality(const RenderVolume& volume) {
   const QualityChoices choices = QualityChoices::of(quality);
+  render.octaves.order = QualityChoices::of(lightQuality.value_or(quality)).lightOrder;
   if (!samplesGiven) render.samples = choices.samples;
   if (!pathsGiven) path.samplesPerPixel = choices.pathsPerPixel;
   // The standard step is the marcher's own: longer where the density hardly varies.

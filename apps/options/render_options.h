@@ -30,6 +30,8 @@ struct PictureOptions : CameraOptions {
   double adaptiveThreshold = 0;
   RenderOptions render;
   Quality quality = Quality::good;
+  /// As `quality` where it is not given.
+  std::optional<Quality> lightQuality{};
   /// These say more than the quality does.
   bool samplesGiven = false, adaptiveGiven = false, pathsGiven = false;
   int seed = 0;

@@ -17,22 +17,10 @@ namespace {
 
 // Of Legendre's moments of a phase function but the 0th, the largest.
 float largestMoment(const Phase& phase) {
-  constexpr int kSteps = 512, kMoments = 4;
-  double sums[kMoments + 1] = {};
-  for (int i = 0; i != kSteps; ++i) {
-    const double angle = double(kPi) * (i + 0.5) / kSteps, x = std::cos(angle);
-    const double share = 2 * double(kPi) * std::sin(angle) * double(kPi) / kSteps * double(phase(float(x)));
-    double before = 1, here = x;
-    for (int n = 1; n <= kMoments; ++n) {
-      sums[n] += share * here;
-      const double next = ((2 * n + 1) * x * here - n * before) / (n + 1);
-      before = here;
-      here = next;
-    }
-  }
-  double largest = 0;
-  for (const double sum : sums) largest = std::max(largest, std::fabs(sum));
-  return float(std::min(largest, 1.0));
+  float largest = 0;
+  const std::vector<float> moments = legendreMoments(phase, 5);
+  for (std::size_t l = 1; l < moments.size(); ++l) largest = std::max(largest, std::fabs(moments[l]));
+  return std::min(largest, 1.0f);
 }
 
 }  // namespace

@@ -182,7 +182,9 @@ void ScatteredLight::addBeam(std::vector<float>& moments, const Vec3i& size, con
 std::vector<float> ScatteredLight::mean() const {
   const std::size_t cells = beam_.size();
   std::vector<float> result(moments_.begin(), moments_.begin() + std::ptrdiff_t(cells));
-  for (std::size_t i = 0; i != cells; ++i) result[i] -= beam_[i];
+  parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) result[i] -= beam_[i];
+  });
   return result;
 }
 

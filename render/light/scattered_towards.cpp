@@ -111,7 +111,9 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
     sent[i] = line.sum + line.through * std::max(sky, 0.0f);
   });
   sharpen(own);
-  for (std::size_t i = 0; i != cells; ++i) sent[i] = share_ * own[i] + (1 - share_) * sent[i];
+  parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) sent[i] = share_ * own[i] + (1 - share_) * sent[i];
+  });
   return sent;
 }
 

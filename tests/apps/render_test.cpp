@@ -58,6 +58,15 @@ TEST_F(RenderVerb, TakesQualitiesWhereNothingElseIsSaid) {
   EXPECT_GT(samplesOf("--quality final --samples 4"), 1.2 * samplesOf("--quality good"));
   EXPECT_EQ(samplesOf("--quality final --samples 4 --step 0.2"), samplesOf("--quality good --step 0.2"));
   EXPECT_EQ(runProgram("render " + fog() + " -o " + folder.file("b.exr") + " --quality best").exitCode, 2);
+  // Of the light: more directions give another picture, and the same ones the same.
+  const auto redOf = [&](const std::string& options) {
+    statsOf("--samples 1 --step 0.1 --adaptive 0 " + options);
+    return readImage(folder.file("a.exr")).channel("R").values;
+  };
+  EXPECT_EQ(redOf("--quality draft --light-quality good"), redOf(""));
+  EXPECT_EQ(redOf("--light-quality final"), redOf("--quality final"));
+  EXPECT_NE(redOf("--quality draft"), redOf(""));
+  EXPECT_EQ(runProgram("render " + fog() + " -o " + folder.file("b.exr") + " --light-quality 9").exitCode, 2);
 }
 
 TEST_F(RenderVerb, WritesAPictureAPreviewAndStatistics) {

@@ -37,6 +37,14 @@ void restrict(const float* values, const ScatteringLattice& fine, const Scatteri
   });
 }
 
+// Elements of long vectors, on all cores.
+template <class Each>
+void forEach(std::size_t count, Each&& each) {
+  parallelFor(count, 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) each(i);
+  });
+}
+
 }  // namespace
 
 TransportSolver::TransportSolver(ScatteringLattice finest, Medium medium)
@@ -108,21 +116,21 @@ void TransportSolver::addCoarse(std::size_t level, const std::vector<float>& lig
   std::vector<float> rest(moments_ * coarseCells), buffer(cells);
   for (std::size_t m = 0; m != moments_; ++m) {
     const float *before = light.data() + m * cells, *after = swept.data() + m * cells;
-    for (std::size_t i = 0; i != cells; ++i) buffer[i] = after[i] - before[i];
+    forEach(cells, [&](std::size_t i) { buffer[i] = after[i] - before[i]; });
     restrict(buffer.data(), fine, coarse, rest.data() + m * coarseCells);
   }
   std::vector<float> missing = rest;
   iterate(
       level + 1, missing,
       [&](std::vector<float>& moments) {
-        for (std::size_t i = 0; i != moments.size(); ++i) moments[i] += rest[i];
+        forEach(moments.size(), [&](std::size_t i) { moments[i] += rest[i]; });
       },
       false, {level + 2 == levels_.size() ? kSweepsOfCoarsest : kSweepsOfError, kToleranceOfError}, progress);
-  for (std::size_t i = 0; i != missing.size(); ++i) missing[i] -= rest[i];
+  forEach(missing.size(), [&](std::size_t i) { missing[i] -= rest[i]; });
   for (std::size_t m = 0; m != moments_; ++m) {
     refine(missing.data() + m * coarseCells, coarse, fine, buffer.data());
     float* after = swept.data() + m * cells;
-    for (std::size_t i = 0; i != cells; ++i) after[i] += buffer[i];
+    forEach(cells, [&](std::size_t i) { after[i] += buffer[i]; });
   }
 }
 
