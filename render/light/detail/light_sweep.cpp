@@ -23,8 +23,10 @@ constexpr int kRow = ScatteringLattice::kRow;
 // take longer than the work.
 constexpr std::size_t kSmall = 1 << 16;
 
-// Copies `count` lattices whose first axis is x to ones whose first axis is y.
-void turn(const float* from, float* to, const Vec3i& n, std::size_t count = 1) {
+// Calls each(plain, turned) with the index of every cell of `count` lattices, where x is the first axis and
+// where y is. Cells that lie near each other either way follow each other.
+template <class Each>
+void forEachTurned(const Vec3i& n, std::size_t count, Each&& each) {
   const std::size_t nx = std::size_t(n.x), ny = std::size_t(n.y), nz = std::size_t(n.z);
   parallelFor(nz * count, std::max<std::size_t>(4, kSmall / (nx * ny)),
               [&](std::size_t begin, std::size_t end) {
@@ -34,27 +36,19 @@ void turn(const float* from, float* to, const Vec3i& n, std::size_t count = 1) {
                     for (std::size_t x0 = 0; x0 != nx; x0 += kRow)
                       for (std::size_t y = y0; y != y0 + kRow; ++y)
                         for (std::size_t x = x0; x != x0 + kRow; ++x)
-                          to[first + (x * nz + z) * ny + y] = from[first + (z * ny + y) * nx + x];
+                          each(first + (z * ny + y) * nx + x, first + (x * nz + z) * ny + y);
                 }
               });
 }
 
+// Copies lattices whose first axis is x to ones whose first axis is y.
+void turn(const float* from, float* to, const Vec3i& n, std::size_t count = 1) {
+  forEachTurned(n, count, [=](std::size_t plain, std::size_t turned) { to[turned] = from[plain]; });
+}
+
 // Adds what was turned, and what lies as it did, to `to`.
 void addTurned(const float* turned, const float* plain, float* to, const Vec3i& n, std::size_t count) {
-  const std::size_t nx = std::size_t(n.x), ny = std::size_t(n.y), nz = std::size_t(n.z);
-  parallelFor(nz * count, std::max<std::size_t>(4, kSmall / (nx * ny)),
-              [&](std::size_t begin, std::size_t end) {
-                for (std::size_t slice = begin; slice != end; ++slice) {
-                  const std::size_t z = slice % nz, first = slice / nz * nx * ny * nz;
-                  for (std::size_t y0 = 0; y0 != ny; y0 += kRow)
-                    for (std::size_t x0 = 0; x0 != nx; x0 += kRow)
-                      for (std::size_t y = y0; y != y0 + kRow; ++y)
-                        for (std::size_t x = x0; x != x0 + kRow; ++x) {
-                          const std::size_t i = first + (z * ny + y) * nx + x;
-                          to[i] = to[i] + plain[i] + turned[first + (x * nz + z) * ny + y];
-                        }
-                }
-              });
+  forEachTurned(n, count, [=](std::size_t i, std::size_t t) { to[i] = to[i] + plain[i] + turned[t]; });
 }
 
 }  // namespace
