@@ -68,7 +68,7 @@ ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards
 
 ScatteredSource ScatteredSource::evenSky() {
   ScatteredSource source;
-  source.sky = [](const std::vector<Vec3f>& towards) { return std::vector<float>(towards.size(), 1.0f); };
+  source.sky = [](const std::vector<Vec3f>& ways) { return std::vector<float>(ways.size(), 1.0f); };
   return source;
 }
 
