@@ -145,6 +145,13 @@ double TextScanner::number(const char* what) {
   return value;
 }
 
+float TextScanner::single(const char* what) {
+  const double value = number(what);
+  if (std::fabs(value) > double(std::numeric_limits<float>::max()))
+    fail(fmt::format("{} is too large: {:g}", what, value));
+  return float(value);
+}
+
 std::int64_t TextScanner::integer(const char* what) {
   if (atLineEnd()) fail(fmt::format("{} is missing", what));
   std::int64_t value = 0;

@@ -62,10 +62,8 @@ class ObjReader {
       } else if (keyword == "f") {
         readFace();
       } else if (keyword == "vt") {
-        const double u = scanner_.number("a texture coordinate");
-        const double v = scanner_.atLineEnd() ? 0.0 : scanner_.number("a texture coordinate");
-        uvs_.push_back(static_cast<float>(u));
-        uvs_.push_back(static_cast<float>(v));
+        uvs_.push_back(scanner_.single("a texture coordinate"));
+        uvs_.push_back(scanner_.atLineEnd() ? 0.0f : scanner_.single("a texture coordinate"));
         ++uvRange_.count;
       } else if (keyword == "g" || keyword == "o") {
         startGroup(scanner_.rest());
@@ -92,12 +90,12 @@ class ObjReader {
     mesh_.positions.emplace_back(x, y, z);
     ++vertexRange_.count;
     if (scanner_.atLineEnd()) return;
-    const double w = scanner_.number("a weight or colour");
+    const float w = scanner_.single("a weight or colour");
     if (scanner_.atLineEnd()) return;  // x y z w: the weight belongs to curves
-    const double green = scanner_.number("a colour");
-    const double blue = scanner_.atLineEnd() ? green : scanner_.number("a colour");
+    const float green = scanner_.single("a colour");
+    const float blue = scanner_.atLineEnd() ? green : scanner_.single("a colour");
     colors_.resize(3 * (mesh_.positions.size() - 1), 1.0f);
-    for (const double c : {w, green, blue}) colors_.push_back(static_cast<float>(c));
+    colors_.insert(colors_.end(), {w, green, blue});
   }
 
   void readFace() {

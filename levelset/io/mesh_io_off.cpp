@@ -72,16 +72,14 @@ Mesh readOff(const MeshFile& file) {
       float rgba[4] = {};
       std::size_t count = 0;
       const std::size_t most = hasUvs ? 3 : 4;
-      while (count < most && !scanner.atLineEnd())
-        rgba[count++] = static_cast<float>(scanner.number("a colour"));
+      while (count < most && !scanner.atLineEnd()) rgba[count++] = scanner.single("a colour");
       if (count < 3) scanner.fail(fmt::format("a colour needs 3 or 4 values, this one has {}", count));
       if (colorWidth == 0) colorWidth = count;
       if (count != colorWidth)
         scanner.fail(fmt::format("a colour of {} values after colours of {}", count, colorWidth));
       colors.insert(colors.end(), rgba, rgba + count);
     }
-    for (int k = 0; hasUvs && k < 2; ++k)
-      uvs.push_back(static_cast<float>(scanner.number("a texture coordinate")));
+    for (int k = 0; hasUvs && k < 2; ++k) uvs.push_back(scanner.single("a texture coordinate"));
     scanner.nextLine();
   }
 

@@ -101,7 +101,10 @@ VdbGrid labelled(const openvdb::GridBase::Ptr& grid, const VdbGridLabel& label) 
   grid->setName(label.name);
   if (label.gridClass != VdbGridInfo::Class::unknown) grid->setGridClass(fileClass(label.gridClass));
   grid->setSaveFloatAsHalf(label.halfFloat);
-  for (const auto& [key, value] : label.metadata) grid->insertMeta(key, openvdb::StringMetadata(value));
+  for (const auto& [key, value] : label.metadata) {
+    require(!key.empty(), fmt::format("grid {}: metadata needs names", detail::displayName(label.name)));
+    grid->insertMeta(key, openvdb::StringMetadata(value));
+  }
   return detail::wrapGrid(grid);
 }
 

@@ -150,6 +150,7 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
       require(other->getName() != copy->getName(),
               fmt::format("{}: two grids are called '{}'", path, copy->getName()));
     for (const auto& [key, value] : metadata) {
+      require(!key.empty(), path + ": metadata needs names");
       copy->removeMeta(key);
       copy->insertMeta(key, openvdb::StringMetadata(value));
     }

@@ -56,6 +56,8 @@ class TextScanner {
   std::string_view rest();
   /// A finite number. @throws Error with the line if there is none; `what` names it ("a coordinate").
   double number(const char* what);
+  /// One that single precision can hold.
+  float single(const char* what);
   std::int64_t integer(const char* what);
   /// Takes `character` if it comes next.
   bool take(char character) {

@@ -97,6 +97,8 @@ TEST(MeshIoBad, FaultsAreNamedWithTheirLine) {
       {"a.obj", "v 0 0\n" + v + "f 1 2 3\n", "line 1: a coordinate is missing"},
       {"a.obj", "v 0 zero 0\n" + v + "f 1 2 3\n", "line 1: a coordinate should be a number, found 'zero'"},
       {"a.obj", "v 0 1e999 0\n" + v + "f 1 2 3\n", "line 1: a coordinate is not finite: '1e999'"},
+      {"a.obj", v + "v 0 0 0 1e60 1 1\nf 1 2 3\n", "line 4: a weight or colour is too large: 1e+60"},
+      {"a.obj", v + "vt 0 -1e39\nf 1 2 3\n", "line 4: a texture coordinate is too large: -1e+39"},
       {"a.obj", v, "has no faces (3 vertices)"},
       {"a.ply", "plx\n", "does not start with the line 'ply'"},
       {"a.ply", "ply\nformat ascii 1.0\n", "no 'end_header'"},

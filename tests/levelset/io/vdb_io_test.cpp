@@ -196,6 +196,16 @@ TEST(VdbIo, RefusesToMakeWhatFilesMustNotHold) {
             "grid 'smoke\\n2' holds values that are not finite");
 }
 
+TEST(VdbIo, RefusesMetadataWithoutAName) {
+  const TemporaryFolder folder;
+  const VdbGridLabel label{"density", Class::fogVolume, false, {{"", "1"}}};
+  EXPECT_EQ(errorOf([&] { toVdb(smallGrid(0.0f, 1.0f), label); }), "grid 'density': metadata needs names");
+  const std::string path = folder.file("a.vdb");
+  const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"density", Class::fogVolume});
+  EXPECT_EQ(errorOf([&] { writeVdbFile(path, {grid}, {{"", "1"}}); }), path + ": metadata needs names");
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
 struct KnownVolume {
   const char* file;
   const char* grid;
