@@ -167,7 +167,7 @@ void writeExr(const std::string& path, const Image& image, const ImageCamera& ca
 void writeExr(const OutputFile& output, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
   image.check();
-  require(!image.channels.empty(), "exr: the image has no channels");
+  require(!image.channels.empty(), output.path() + ": the image has no channels");
   const Imath::Box2i window = detail::dataWindow(image.width, image.height, image.display);
   Imf::Header header = namingFile(output.path(), [&] {
     return detail::exrHeader(image.width, image.height, image.display, camera, metadata);

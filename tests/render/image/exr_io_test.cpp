@@ -101,6 +101,18 @@ TEST(ExrIo, RefusesAChannelThatHasNotAValueForEveryPixel) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
+TEST(ExrIo, NamesTheFileOfAPictureWithoutChannels) {
+  const test::TemporaryFolder folder;
+  Image image = someImage();
+  image.channels.clear();
+  try {
+    writeExr(folder.file("a.exr"), image, someCamera());
+    ADD_FAILURE() << "a picture of nothing was written";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), folder.file("a.exr") + ": the image has no channels");
+  }
+}
+
 TEST(ExrIo, NamesTheFileOfAPictureWithoutAlpha) {
   const test::TemporaryFolder folder;
   Image image = someImage();
