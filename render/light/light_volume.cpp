@@ -52,6 +52,33 @@ constexpr int kPatch = kN + 5;             // density samples around a brick's s
 constexpr int kPitch = detail::kSliceRow;  // floats per row of a patch
 static_assert(kN == detail::kSliceNodes);
 
+// Bricks that 3 x 3 around each of `occupied` cover, across the axis that has most of them.
+double reachedBricks(const std::vector<Vec3i>& occupied) {
+  // Beyond, looking would take longer than it is worth.
+  constexpr double kMostPlaces = 1 << 26;
+  Vec3i low = occupied.front(), high = low;
+  for (const Vec3i& brick : occupied) low = min(low, brick), high = max(high, brick);
+  const Vec3i n = high - low + Vec3i{3, 3, 3};
+  if (double(n.x) * n.y * n.z > kMostPlaces) return 9.0 * double(occupied.size());
+  std::size_t most = 0;
+  for (int w = 0; w != 3; ++w) {
+    std::vector<bool> reached(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+    std::size_t count = 0;
+    for (const Vec3i& brick : occupied)
+      for (int k = 0; k != 9; ++k) {
+        Vec3i place = brick - low + Vec3i{1, 1, 1};
+        place[(w + 1) % 3] += k % 3 - 1;
+        place[(w + 2) % 3] += k / 3 - 1;
+        const std::size_t i =
+            (std::size_t(place.z) * std::size_t(n.y) + std::size_t(place.y)) * std::size_t(n.x) +
+            std::size_t(place.x);
+        if (!reached[i]) reached[i] = true, ++count;
+      }
+    most = std::max(most, count);
+  }
+  return double(most);
+}
+
 }  // namespace
 
 /// Density samples of a plane, the first of which stands at (u, v).
@@ -341,13 +368,14 @@ float LightVolume::columnDensity(const Vec3f& world) const {
 }
 
 double LightVolume::estimateBytes(const RenderVolume& volume) {
-  // Sheared by 45 degrees both ways, a brick reaches into at most 3 x 3; bricks side by side share all but
-  // the rim.
-  const Vec3f size = volume.indexBounds().isEmpty() ? Vec3f{} : volume.indexBounds().size() * (1.0f / kBrick);
+  if (volume.isEmpty()) return 0;
+  // Sheared by 45 degrees both ways, a brick reaches into at most 3 x 3 across; those of bricks side by side
+  // are the same ones.
+  const Vec3f size = volume.indexBounds().size() * (1.0f / kBrick);
   double box = 0;
   for (int w = 0; w != 3; ++w)
     box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
-  const double bricks = std::min(9.0 * double(volume.occupiedBricks().size()), box);
+  const double bricks = std::min(reachedBricks(volume.occupiedBricks()), box);
   return bricks * kVolume * sizeof(float) + box * (sizeof(std::int32_t) + sizeof(CodedBricks::Entry));
 }
 
