@@ -52,23 +52,23 @@ constexpr int kPatch = kN + 5;             // density samples around a brick's s
 constexpr int kPitch = detail::kSliceRow;  // floats per row of a patch
 static_assert(kN == detail::kSliceNodes);
 
-// Bricks that 3 x 3 around each of `occupied` cover, across the axis that has most of them.
+// Bricks that 4 x 4 around each of `occupied` cover, across the axis that has most of them.
 double reachedBricks(const std::vector<Vec3i>& occupied) {
   // Beyond, looking would take longer than it is worth.
   constexpr double kMostPlaces = 1 << 26;
   Vec3i low = occupied.front(), high = low;
   for (const Vec3i& brick : occupied) low = min(low, brick), high = max(high, brick);
-  const Vec3i n = high - low + Vec3i{3, 3, 3};
-  if (double(n.x) * n.y * n.z > kMostPlaces) return 9.0 * double(occupied.size());
+  const Vec3i n = high - low + Vec3i{4, 4, 4};
+  if (double(n.x) * n.y * n.z > kMostPlaces) return 16.0 * double(occupied.size());
   std::size_t most = 0;
   for (int w = 0; w != 3; ++w) {
     std::vector<bool> reached(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
     std::size_t count = 0;
     for (const Vec3i& brick : occupied)
-      for (int k = 0; k != 9; ++k) {
+      for (int k = 0; k != 16; ++k) {
         Vec3i place = brick - low + Vec3i{1, 1, 1};
-        place[(w + 1) % 3] += k % 3 - 1;
-        place[(w + 2) % 3] += k / 3 - 1;
+        place[(w + 1) % 3] += k % 4 - 1;
+        place[(w + 2) % 3] += k / 4 - 1;
         const std::size_t i =
             (std::size_t(place.z) * std::size_t(n.y) + std::size_t(place.y)) * std::size_t(n.x) +
             std::size_t(place.x);
@@ -369,13 +369,14 @@ float LightVolume::columnDensity(const Vec3f& world) const {
 
 double LightVolume::estimateBytes(const RenderVolume& volume) {
   if (volume.isEmpty()) return 0;
-  // Sheared by 45 degrees both ways, a brick reaches into at most 3 x 3 across; those of bricks side by side
-  // are the same ones.
+  // Sheared by 45 degrees both ways, a brick and a node around it reach into at most 4 x 4 across; those of
+  // bricks side by side are the same ones.
   const Vec3f size = volume.indexBounds().size() * (1.0f / kBrick);
   double box = 0;
   for (int w = 0; w != 3; ++w)
     box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
-  const double bricks = std::min(reachedBricks(volume.occupiedBricks()), box);
+  // Two more are what is empty and what is dark.
+  const double bricks = std::min(reachedBricks(volume.occupiedBricks()), box) + 2;
   return bricks * kVolume * sizeof(float) + box * (sizeof(std::int32_t) + sizeof(CodedBricks::Entry));
 }
 
