@@ -1,10 +1,11 @@
-"""Renders one density by one sun with Blender's Cycles; run by compare_cycles.py.
+"""Renders one density by one sun with Blender's Cycles; run by compare_cycles.py and reference.py.
 
     blender -b --factory-startup --python cycles_scene.py -- SCENE.json
 
-SCENE.json: volume, picture (.exr), size [w, h], camera, target, fov (horizontal, degrees), towards_sun, irradiance, sky [r, g, b],
-extinction, albedo, g, samples, bounces (of volumes), step_rate (steps in voxels), threads, seed. World space is the file's own: y
-up or not makes no difference.
+SCENE.json: volume, picture (.exr), size [w, h], camera, target, up ([0, 1, 0] if it is not there), fov (horizontal, degrees),
+towards_sun, irradiance (a number or [r, g, b]), sky [r, g, b], extinction, albedo, g, samples, bounces (of volumes), step_rate (steps in
+voxels), filter_width (of a Blackman-Harris filter; without it a box of one pixel), threads, seed. World space is the file's own: y up
+or not makes no difference.
 """
 
 import json
@@ -46,10 +47,10 @@ material.cycles.volume_interpolation = "LINEAR"
 volume.data.materials.append(material)
 
 
-def looking(eye, along):
-    """At `eye`, with -z along `along` and y as near the world's as can be."""
+def looking(eye, along, upwards=(0, 1, 0)):
+    """At `eye`, with -z along `along` and y as near `upwards` as can be."""
     back = -Vector(along).normalized()
-    right = Vector((0, 1, 0)).cross(back).normalized()
+    right = Vector(upwards).cross(back).normalized()
     up = back.cross(right)
     matrix = Matrix((right, up, back)).transposed().to_4x4()
     matrix.translation = eye
@@ -68,10 +69,13 @@ camera.sensor_fit = "HORIZONTAL"
 camera.angle = math.radians(wanted["fov"])
 distance = (Vector(wanted["target"]) - Vector(wanted["camera"])).length
 camera.clip_start, camera.clip_end = distance / 1000, distance * 10
-scene.camera = add("camera", camera, looking(wanted["camera"], Vector(wanted["target"]) - Vector(wanted["camera"])))
+scene.camera = add("camera", camera, looking(wanted["camera"], Vector(wanted["target"]) - Vector(wanted["camera"]),
+                                             wanted.get("up", (0, 1, 0))))
 
 sun = bpy.data.lights.new("sun", "SUN")
-sun.energy = wanted["irradiance"]
+irradiance = wanted["irradiance"] if isinstance(wanted["irradiance"], list) else [wanted["irradiance"]] * 3
+sun.energy = max(irradiance)
+sun.color = [value / sun.energy for value in irradiance]
 sun.angle = 0
 add("sun", sun, looking((0, 0, 0), -Vector(wanted["towards_sun"])))
 
@@ -98,7 +102,8 @@ cycles.samples = wanted["samples"]
 cycles.seed = wanted["seed"]
 cycles.use_adaptive_sampling = False
 cycles.use_denoising = False
-cycles.pixel_filter_type = "BOX"
+cycles.pixel_filter_type = "BLACKMAN_HARRIS" if "filter_width" in wanted else "BOX"
+cycles.filter_width = wanted.get("filter_width", 1)
 cycles.light_sampling_threshold = 0
 cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
 cycles.max_bounces = max(wanted["bounces"], 1)
