@@ -149,10 +149,13 @@ class PieceWriter {
           for (std::size_t i = begin; i < end; ++i) {
             const Mesh mesh = withMaterials(pieces_.pieces[i].mesh);
             TextWriter pointText;
-            texts[i].uv = detail::writeObjPoints(pointText, mesh);
+            // Beside pieces that are .ply files stands the .obj of all.
+            const bool isPly = options_.format == PieceFilesOptions::Format::ply;
+            namingFile(isPly ? kAll : names_[i],
+                       [&] { texts[i].uv = detail::writeObjPoints(pointText, mesh); });
             texts[i].points = pointText.take();
             const std::string temporary = folder_.temporary(i);
-            if (options_.format == PieceFilesOptions::Format::ply) {
+            if (isPly) {
               writeMesh(temporary, mesh);
               continue;
             }

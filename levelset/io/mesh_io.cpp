@@ -243,7 +243,7 @@ void writeMesh(const std::string& path, const Mesh& mesh) {
 
   OutputFile output(path);
   OutputStream stream(output);
-  write(stream.file(), mesh);
+  namingFile(path, [&] { write(stream.file(), mesh); });
   stream.close();
   output.commit();
 }

@@ -19,7 +19,8 @@ Mesh readMesh(const std::string& path);
 /// Writes .obj, .ply (binary little-endian) or .stl (binary, no attributes) by extension, whole or not at
 /// all.
 /// @throws Error naming the path; also for an unknown extension, coordinates that are not finite (.stl: as
-/// floats), and faces of fewer than three corners (not .stl, which has none of them).
+/// floats), faces of fewer than three corners (not .stl, which has none of them), and colours or texture
+/// coordinates that are not finite (.obj; a .ply holds them).
 void writeMesh(const std::string& path, const Mesh& mesh);
 
 }  // namespace nephele

@@ -2,9 +2,15 @@
 // value is a float), written without a locale.
 #include "nephele/levelset/io/obj_text.h"
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <charconv>
+#include <cmath>
+#include <span>
 #include <unordered_map>
+
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::detail {
 namespace {
@@ -13,6 +19,15 @@ namespace {
 std::string oneLine(std::string name) {
   for (char& c : name) c = c == '\n' || c == '\r' ? ' ' : c;
   return name;
+}
+
+// What no reader takes is not written: `nan` and `inf` are no numbers of an OBJ file.
+void requireFinite(std::span<const float> values, const char* what, std::string_view where,
+                   std::size_t index) {
+  for (const float value : values)
+    if (!std::isfinite(value))
+      throw Error(fmt::format("{} of {} {} is {}, which an .obj cannot hold", what, where, index,
+                              std::isnan(value) ? "not a number" : "infinite"));
 }
 
 }  // namespace
@@ -48,9 +63,12 @@ ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& of
     out.text("v");
     const Vec3d p = mesh.positions[v] + offset;
     for (int k = 0; k < 3; ++k) out.text(" ").number(p[k]);
-    if (color)
-      for (std::size_t k = 0; k < 3; ++k)
-        out.text(" ").number(color->values[v * static_cast<std::size_t>(color->width) + k]);
+    if (color) {
+      const std::span<const float> values{color->values.data() + v * static_cast<std::size_t>(color->width),
+                                          3};
+      requireFinite(values, "the colour", "vertex", v);
+      for (const float value : values) out.text(" ").number(value);
+    }
     out.text("\n");
   }
   ObjCoordinates result;
@@ -58,8 +76,11 @@ ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& of
   result.index.reserve(mesh.corners.size());
   std::unordered_map<std::uint64_t, std::uint32_t> known;
   known.reserve(mesh.positions.size());
+  const bool isOfCorners = uv->domain == MeshAttribute::Domain::corner;
   for (std::size_t c = 0; c < mesh.corners.size(); ++c) {
-    const std::size_t item = uv->domain == MeshAttribute::Domain::corner ? c : mesh.corners[c];
+    const std::size_t item = isOfCorners ? c : mesh.corners[c];
+    requireFinite({uv->values.data() + 2 * item, 2}, "a texture coordinate",
+                  isOfCorners ? "corner" : "vertex", item);
     const float u = uv->values[2 * item], v = uv->values[2 * item + 1];
     const std::uint64_t key =
         std::uint64_t{std::bit_cast<std::uint32_t>(u)} << 32 | std::bit_cast<std::uint32_t>(v);

@@ -49,7 +49,8 @@ struct ObjCoordinates {
   std::uint32_t count = 0;
 };
 
-/// Lines `v` and `vt` of a mesh.
+/// Lines `v` and `vt` of a mesh, whose positions are finite.
+/// @throws Error if a colour or texture coordinate is not: no reader takes such a number.
 ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& offset = {});
 
 /// Which lines stand in front of the faces of a group.

@@ -25,6 +25,22 @@ TEST_F(CutVerb, NoPieceLeftIsAnErrorThatWritesNothing) {
   EXPECT_FALSE(fs::exists(file("out")));
 }
 
+// A .ply may hold texture coordinates that are no numbers; an .obj, that of all pieces too, may not.
+TEST_F(CutVerb, TextureCoordinatesThatAreNoNumbersAreRefusedByTheNameOfTheirFile) {
+  textFile("nan.ply",
+           "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+           "property float s\nproperty float t\nelement face 4\nproperty list uchar int vertex_indices\n"
+           "end_header\n0 0 0 0 0\n1 0 0 nan 0\n0 1 0 0 1\n0 0 1 1 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n");
+  for (const std::string format : {"obj", "ply"}) {
+    const ProgramResult result = attempt(file("nan.ply") + " --plane 0.2,0,0,1,0,0 --format " + format);
+    EXPECT_EQ(result.exitCode, 1);
+    EXPECT_NE(result.errors.find(format == "obj" ? "error: piece_000" : "error: pieces.obj"),
+              std::string::npos);
+    EXPECT_NE(result.errors.find("a texture coordinate of corner"), std::string::npos) << result.errors;
+    EXPECT_FALSE(fs::exists(file("out")));
+  }
+}
+
 TEST_F(CutVerb, OlderPiecesMakeRoomAndOtherFilesStay) {
   cut(ball() + " --random-planes 3 --explode 1");
   textFile("out/notes.txt", "mine");

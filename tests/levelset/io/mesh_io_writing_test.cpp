@@ -59,6 +59,40 @@ TEST(MeshIo, WhatCouldNotBeReadIsNotWritten) {
   EXPECT_EQ(errorOf("b.stl", open), "");
 }
 
+// `nan` and `inf` are no numbers of text formats; a binary .ply has them, and our reader takes them.
+TEST(MeshIo, ColoursAndTextureCoordinatesThatAreNotFiniteAreNotWrittenAsText) {
+  const TemporaryFolder folder;
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  Mesh uv = decorated(), color = decorated(), mass = decorated();
+  uv.attributes[0].values[2 * 5 + 1] = nan;
+  color.attributes[1].values[3 * 4] = -inf;
+  mass.attributes[2].values[1] = nan;
+  const std::string path = folder.file("a.obj");
+  const auto errorOf = [&](const Mesh& mesh) -> std::string {
+    try {
+      writeMesh(path, mesh);
+    } catch (const Error& error) {
+      EXPECT_FALSE(std::filesystem::exists(path));
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(errorOf(uv),
+            path + ": a texture coordinate of corner 5 is not a number, which an .obj cannot hold");
+  EXPECT_EQ(errorOf(color), path + ": the colour of vertex 4 is infinite, which an .obj cannot hold");
+  EXPECT_EQ(errorOf(mass), "") << "an .obj has no such attribute";
+  EXPECT_NO_THROW(readMesh(path));
+
+  writeMesh(folder.file("a.ply"), uv);
+  EXPECT_TRUE(std::isnan(find(readMesh(folder.file("a.ply")), "uv")->values[2 * 5 + 1]));
+  writeMesh(folder.file("b.ply"), mass);
+  EXPECT_TRUE(std::isnan(find(readMesh(folder.file("b.ply")), "mass")->values[1]));
+  writeMesh(folder.file("c.ply"), color);
+  EXPECT_EQ(find(readMesh(folder.file("c.ply")), "color")->values[3 * 4], 0.0f) << "bytes hold 0 to 1";
+  writeMesh(folder.file("a.stl"), uv);
+  EXPECT_NO_THROW(readMesh(folder.file("a.stl")));
+}
+
 TEST(MeshIo, ObjRoundTripKeepsEverythingItCanHold) {
   const TemporaryFolder folder;
   const Mesh mesh = decorated();
