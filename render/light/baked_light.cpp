@@ -292,7 +292,10 @@ ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
   ScatteredSource result;
   result.shadow = local.shadow[colour];
   result.place = local.position;
-  result.column = [&shadows](const Vec3f& world) { return shadows.columnDensity(world); };
+  result.columns = [&shadows](std::span<const Vec3f> world, std::span<float> columns) {
+    std::transform(world.begin(), world.end(), columns.begin(),
+                   [&](const Vec3f& point) { return shadows.columnDensity(point); });
+  };
   // The mean of 1 / r^2 over a ball as large as a voxel, about the light, is that at this distance.
   result.irradiance = [&local, least = 0.36f * voxelSize](const Vec3f& world) {
     const Vec3f way = world - local.position;

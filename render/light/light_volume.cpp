@@ -350,21 +350,32 @@ void LightVolume::code() {
 }
 
 float LightVolume::columnDensity(const Vec3f& world) const {
-  if (table_.empty()) return 0.0f;
-  const Vec3f p = worldToLattice_(world);
-  const Vec3i cell{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
-  const Vec3i brick{brickOf(cell.x), brickOf(cell.y), brickOf(cell.z)};
-  const Vec3i b = brick - firstBrick_;
-  for (int axis = 0; axis != 3; ++axis)
-    if (b[axis] < 0 || b[axis] >= brickCount_[axis]) return 0.0f;
-  const std::size_t place =
-      (std::size_t(b.z) * brickCount_.y + std::size_t(b.y)) * brickCount_.x + std::size_t(b.x);
-  const auto node = [&](const Vec3i& n) {
-    if (!coded_.isEmpty()) return coded_.at(place, n);
-    return values_[std::size_t(table_[place]) * kVolume + std::size_t((n.z * kWidth + n.y) * kWidth + n.x)];
-  };
-  const Vec3i at = cell - brick * kBrick;
-  return trilinear(p - Vec3f(cell), [&](int x, int y, int z) { return node(at + Vec3i{x, y, z}); });
+  float column = 0;
+  columnDensities({&world, 1}, {&column, 1});
+  return column;
+}
+
+void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float> columns) const {
+  const auto floorOf = [](float x) { return int(x) - (x < float(int(x))); };
+  for (std::size_t n = 0; n != world.size(); ++n) {
+    const Vec3f p = worldToLattice_(world[n]);
+    const Vec3i cell{floorOf(p.x), floorOf(p.y), floorOf(p.z)}, corner = cell - firstBrick_ * kBrick;
+    const Vec3i brick{brickOf(corner.x), brickOf(corner.y), brickOf(corner.z)};
+    columns[n] = 0.0f;
+    if (!BrickBox{{}, brickCount_}.covers(brick)) continue;
+    const std::size_t place = BrickBox{{}, brickCount_}.numberOf(brick);
+    const Vec3i at = corner - brick * kBrick;
+    if (!isStored(table_[place]))
+      columns[n] = table_[place] == 0 ? 0.0f : dark_;
+    else if (coded_.isEmpty())
+      columns[n] = trilinear(values_.data() + std::size_t(table_[place]) * kVolume +
+                                 std::size_t((at.z * kWidth + at.y) * kWidth + at.x),
+                             p - Vec3f(cell), kWidth, kWidth * kWidth);
+    else
+      columns[n] = trilinear(p - Vec3f(cell), [&](int x, int y, int z) {
+        return coded_.at(place, at + Vec3i{x, y, z});
+      });
+  }
 }
 
 double LightVolume::estimateBytes(const RenderVolume& volume) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "nephele/modeling/base/progress.h"
@@ -74,8 +75,10 @@ class LightVolume {
   void addShade(const std::function<double(const Ray&)>& distanceToShade, const Box& box,
                 const Vec3f& towards, float perDepth);
 
-  /// c at a world-space point. Slow; for tests.
+  /// c at a world-space point.
   float columnDensity(const Vec3f& world) const;
+  /// The same at as many points as there are `columns`.
+  void columnDensities(std::span<const Vec3f> world, std::span<float> columns) const;
   std::size_t memoryBytes() const {
     return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t) + coded_.memoryBytes();
   }

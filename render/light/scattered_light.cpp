@@ -61,7 +61,9 @@ void check(const Scattering& scattering, const ScatteredLight::Options& options)
 ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards) {
   ScatteredSource source;
   source.irradiance = [](const Vec3f&) { return 1.0f; };
-  source.column = [&sun](const Vec3f& world) { return sun.columnDensity(world); };
+  source.columns = [&sun](std::span<const Vec3f> world, std::span<float> columns) {
+    sun.columnDensities(world, columns);
+  };
   source.towards = towards;
   return source;
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "nephele/modeling/base/progress.h"
@@ -22,8 +23,10 @@ struct Scattering {
 
 /// Where light comes from: a beam through the volume, the sky around it, or what glows in it.
 struct ScatteredSource {
-  /// Irradiance of the beam at a world-space point without the volume, and the density on its way there.
-  std::function<float(const Vec3f&)> irradiance, column;
+  /// Irradiance of the beam at a world-space point without the volume.
+  std::function<float(const Vec3f&)> irradiance;
+  /// The density on the beam's way to points, see LightVolume::columnDensities.
+  std::function<void(std::span<const Vec3f> world, std::span<float> columns)> columns;
   /// Multiplies the extinction on that way.
   float shadow = 1.0f;
   /// Where the beam comes from: a direction towards it, or a place.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/exp_of_minus.h"
@@ -28,42 +29,68 @@ float meanTransmittance(float before, float depth) {
   return (expOfMinus(before - up) - expOfMinus(std::min(before + down, 80.0f))) / (up + down);
 }
 
-// Calls visit(cell, voxel, rho) for samples between the voxels, as many in every cell.
+// A row of samples along x.
+struct SampleRow {
+  static constexpr int kMost = 2 * BrickGrid::kBrick;
+
+  // Cell of the first sample, and how many samples one cell has.
+  std::size_t cell;
+  int perCell;
+  // The first sample in voxels; the others follow at the samples' spacing.
+  Vec3f voxel;
+  std::span<const float> density;
+
+  std::size_t cellOf(std::size_t sample) const { return cell + sample / std::size_t(perCell); }
+};
+
+// Calls visit(row) for samples between the voxels, as many in every cell, where any is above 0.
 template <class Visit>
-void forEachSample(const RenderVolume& volume, const LatticePlacement& place,
-                   const ScatteringLattice& lattice, Visit&& visit) {
+void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const ScatteringLattice& lattice,
+                Visit&& visit) {
   const BrickGrid& grid = volume.density();
   const std::vector<Vec3i>& occupied = volume.occupiedBricks();
   const float spacing = spacingOf(place.factor);
   const int across = int(float(BrickGrid::kBrick) / spacing), perBrick = BrickGrid::kBrick / place.factor;
+  int low[SampleRow::kMost];
+  float at[SampleRow::kMost], share[SampleRow::kMost];
+  for (int n = 0; n != across; ++n) {
+    at[n] = (float(n) + 0.5f) * spacing - 0.5f;
+    low[n] = int(std::floor(at[n]));
+    share[n] = at[n] - float(low[n]);
+  }
   parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
+    float density[SampleRow::kMost];
     for (std::size_t i = begin; i != end; ++i) {
       const Vec3i origin = (occupied[i] - place.firstBrick) * perBrick;
-      const float* values = grid.brick(grid.poolIndex(occupied[i]));
-      const auto split = [&](int n, int& low, float& share) {
-        const float at = (float(n) + 0.5f) * spacing - 0.5f;
-        low = int(std::floor(at));
-        share = at - float(low);
-        return at;
-      };
-      for (int z = 0; z < across; ++z)
-        for (int y = 0; y < across; ++y)
-          for (int x = 0; x < across; ++x) {
-            int lx, ly, lz;
-            float fx, fy, fz;
-            const Vec3f p{split(x, lx, fx), split(y, ly, fy), split(z, lz, fz)};
-            const auto row = [&](int j, int k) {
-              const float* at = values + sampleOffset(lx, ly + j, lz + k);
-              const float a = std::max(at[0], 0.0f);
-              return a + fx * (std::max(at[1], 0.0f) - a);
-            };
-            const auto plane = [&](int k) { return row(0, k) + fy * (row(1, k) - row(0, k)); };
-            const float rho = plane(0) + fz * (plane(1) - plane(0));
-            if (!(rho > 0)) continue;
-            visit(lattice.index(origin.x + x * perBrick / across, origin.y + y * perBrick / across,
-                                origin.z + z * perBrick / across),
-                  Vec3f(occupied[i] * BrickGrid::kBrick) + p, rho);
+      const std::int32_t pool = grid.poolIndex(occupied[i]);
+      const float* values = grid.brick(pool);
+      const Interval& range = grid.ranges()[std::size_t(pool)];
+      std::fill_n(density, across, range.max);
+      for (int z = 0; z != across; ++z)
+        for (int y = 0; y != across; ++y) {
+          float most = range.max;
+          if (!range.isPoint()) {
+            const float* rows[4];
+            for (int n = 0; n != 4; ++n) rows[n] = values + sampleOffset(0, low[y] + n % 2, low[z] + n / 2);
+            most = 0;
+            for (int x = 0; x != across; ++x) {
+              const auto along = [&](const float* row) {
+                const float a = std::max(row[low[x]], 0.0f);
+                return a + share[x] * (std::max(row[low[x] + 1], 0.0f) - a);
+              };
+              const float near0 = along(rows[0]), near1 = along(rows[1]), far0 = along(rows[2]),
+                          far1 = along(rows[3]);
+              const float near = near0 + share[y] * (near1 - near0), far = far0 + share[y] * (far1 - far0);
+              density[x] = near + share[z] * (far - near);
+              most = std::max(most, density[x]);
+            }
           }
+          if (!(most > 0)) continue;
+          visit(SampleRow{
+              lattice.index(origin.x, origin.y + y * perBrick / across, origin.z + z * perBrick / across),
+              across / perBrick, Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
+              std::span<const float>(density, std::size_t(across))});
+        }
     }
   });
 }
@@ -88,26 +115,42 @@ ScatteringLattice LatticePlacement::lattice() const {
 }
 
 void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice) {
-  forEachSample(volume, place, lattice,
-                [&](std::size_t cell, const Vec3f&, float rho) { lattice.density[cell] += rho; });
+  forEachRow(volume, place, lattice, [&](const SampleRow& row) {
+    for (std::size_t n = 0; n != row.density.size(); ++n) lattice.density[row.cellOf(n)] += row.density[n];
+  });
   const float samples = samplesPerCell(place);
   for (float& value : lattice.density) value /= samples;
 }
 
 void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const ScatteredSource& source,
                 float extinction, ScatteringLattice& lattice) {
-  if (!source.column && !source.glow) return;
+  if (!source.columns && !source.glow) return;
   const BrickGrid& grid = volume.density();
-  const float perDensity = extinction * source.shadow * grid.voxelSize() * spacingOf(place.factor);
-  forEachSample(volume, place, lattice, [&](std::size_t cell, const Vec3f& voxel, float rho) {
-    const Vec3f world = grid.indexToWorld()(voxel);
-    if (source.glow) {
-      lattice.beam[cell] += rho * source.glow(world);
-      return;
+  const float spacing = spacingOf(place.factor), behind = extinction * source.shadow,
+              perDensity = behind * grid.voxelSize() * spacing;
+  forEachRow(volume, place, lattice, [&](const SampleRow& row) {
+    const std::size_t count = row.density.size();
+    Vec3f world[SampleRow::kMost];
+    for (std::size_t n = 0; n != count; ++n)
+      world[n] = grid.indexToWorld()(row.voxel + Vec3f{float(n) * spacing, 0, 0});
+    float columns[SampleRow::kMost];
+    if (source.columns) source.columns({world, count}, {columns, count});
+    // Inside a thick cloud the next sample is often like the last.
+    float before = -1, rho = -1, left = 0;
+    for (std::size_t n = 0; n != count; ++n) {
+      if (!(row.density[n] > 0)) continue;
+      float& beam = lattice.beam[row.cellOf(n)];
+      if (source.glow) {
+        beam += row.density[n] * source.glow(world[n]);
+        continue;
+      }
+      if (columns[n] != before || row.density[n] != rho) {
+        before = columns[n];
+        rho = row.density[n];
+        left = meanTransmittance(std::clamp(behind * before, 0.0f, 80.0f), std::min(perDensity * rho, 80.0f));
+      }
+      beam += rho * source.irradiance(world[n]) / (4 * kPi) * left;
     }
-    const float before = std::clamp(extinction * source.shadow * source.column(world), 0.0f, 80.0f);
-    lattice.beam[cell] += rho * source.irradiance(world) / (4 * kPi) *
-                          meanTransmittance(before, std::min(perDensity * rho, 80.0f));
   });
   const float samples = samplesPerCell(place);
   for (std::size_t i = 0; i != lattice.beam.size(); ++i)
