@@ -1,5 +1,6 @@
 """Two panels side by side as an SVG: what a benchmark measures against a count."""
 import json
+import math
 import subprocess
 from dataclasses import dataclass
 
@@ -59,5 +60,45 @@ def write(path, lines, titles, counted, doubling=None):
            '<rect width="880" height="360" fill="white"/>']
     out += panel(lines, 1, titles[0], counted, LEFT)
     out += panel(lines, 2, titles[1], counted, 2 * LEFT + WIDTH + GAP, doubling)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("\n".join(out + ["</svg>"]) + "\n")
+
+
+def logarithmic_panel(lines, title, counted, left, top):
+    """As `panel`, of (x, y), both in powers of ten; what is not above zero is left out."""
+    kept = [Line(line.label, line.colour, [p for p in line.points if min(p) > 0]) for line in lines]
+    spans = []
+    for column in (0, 1):
+        logs = [math.log10(point[column]) for line in kept for point in line.points]
+        spans.append((math.floor(min(logs) - 0.05), math.ceil(max(logs) + 0.05)))
+    (x0, x1), (y0, y1) = spans
+    x = lambda value: left + WIDTH * (math.log10(value) - x0) / (x1 - x0)
+    y = lambda value: top + HEIGHT * (1 - (math.log10(value) - y0) / (y1 - y0))
+    out = [f'<text x="{left + WIDTH / 2}" y="{top - 16}" text-anchor="middle">{title}</text>',
+           f'<path d="M{left} {top}V{top + HEIGHT}H{left + WIDTH}" fill="none" stroke="#444"/>']
+    for power in range(y0, y1 + 1):
+        at = y(10.0**power)
+        out.append(f'<path d="M{left} {at:.1f}h{WIDTH}" stroke="#ddd"/>'
+                   f'<text x="{left - 6}" y="{at + 4:.1f}" text-anchor="end">{10.0**power:g}</text>')
+    for power in range(x0, x1 + 1):
+        at = x(10.0**power)
+        out.append(f'<path d="M{at:.1f} {top}v{HEIGHT}" stroke="#ddd"/>'
+                   f'<text x="{at:.1f}" y="{top + HEIGHT + 18}" text-anchor="middle">{10.0**power:g}</text>')
+    out.append(f'<text x="{left + WIDTH / 2}" y="{top + HEIGHT + 36}" text-anchor="middle">{counted}</text>')
+    for row, line in enumerate(kept):
+        path = " ".join(f"{x(p[0]):.1f},{y(p[1]):.1f}" for p in line.points)
+        out.append(f'<polyline points="{path}" fill="none" stroke="{line.colour}" stroke-width="2"/>')
+        out += [f'<circle cx="{x(p[0]):.1f}" cy="{y(p[1]):.1f}" r="3" fill="{line.colour}"/>' for p in line.points]
+        out.append(f'<text x="{left + WIDTH - 8}" y="{top + 18 + 18 * row}" text-anchor="end" fill="{line.colour}">{line.label}</text>')
+    return out
+
+
+def write_logarithmic(path, panels, counted):
+    """`panels`, (title, lines), in rows of two."""
+    height = (len(panels) + 1) // 2 * (HEIGHT + 100) + 10
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 880 {height}" font-family="sans-serif" font-size="13">',
+           f'<rect width="880" height="{height}" fill="white"/>']
+    for i, (title, lines) in enumerate(panels):
+        out += logarithmic_panel(lines, title, counted, LEFT + i % 2 * (LEFT + WIDTH + GAP), TOP + i // 2 * (HEIGHT + 100))
     with open(path, "w", encoding="utf-8") as file:
         file.write("\n".join(out + ["</svg>"]) + "\n")

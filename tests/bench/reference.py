@@ -6,7 +6,8 @@ Usage: reference.py PROGRAM FOLDER [--what SET ...] [--do STEP ...] [--parts N] 
 Sets (--what):
   angle    the cloud of Walt Disney Animation Studios, one free path per voxel, mean cosine 0.3, 0.85 and 0.877, three suns
   depth    the same cloud from 0.05 to 16 free paths per voxel, mean cosine 0.3 and 0.85: the mean, marched over traced
-  disney   the same cloud in the medium, light and view of pbrt's scene disney-cloud
+  disney   the same cloud in the light, the view and the phase function of pbrt's scene disney-cloud, one free path per voxel
+  dense    the same at the density of that scene, 13 free paths per voxel
   cumulus, wisps, droplets   three clouds of this program's own making
 
 Steps (--do; all of them, in this order, if none is given):
@@ -20,7 +21,8 @@ Steps (--do; all of them, in this order, if none is given):
 Errors: `mean` is that of the mean luminance of the whole picture; `rms` and `worst` are of means of blocks of 16x16 pixels that the
 cloud covers by half or more; relMSE is the mean over pixels and channels of (picture - reference)^2 / (reference^2 + 0.01). Squared
 errors are products of the differences to two halves of the reference with other seeds, whose noise is independent, so that it cancels in
-the mean. `noise` is the root mean square of the standard error of a block of the reference. Where a picture is itself made of parts, it is
+the mean. `noise` is the root mean square of the standard error of a block of the reference. Bright blocks have at least a tenth of the
+light of the brightest. Where a picture is itself made of parts, it is
 compared with the other parts.
 
 How accurate the light is, in two tables, with references that are in FOLDER; make them once by --do trace:
@@ -39,18 +41,17 @@ import sys
 import time
 
 import compare_cycles
-import plot_svg
+import reference_report
+from reference_pictures import PART, SIZE, inside, load, save
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SOURCE = os.path.dirname(os.path.dirname(HERE))
-SIZE, BLOCK, PART = (160, 120), 16, 64
 SUNS = ("front", "side", "back")
 VIEW = ["--view", "25,5"]
 AZIMUTHS = {"front": "45,35", "side": "115,30", "back": "195,25"}
 # pbrt's scene looks from azimuth 92; its own sun is the first. Its field of view is that of the shorter side.
 DISNEY_VIEW = ["--camera-position=648.064,-82.473,-63.856", "--look-at=6.021,100.043,-43.679", "--up=0.273,0.962,-0.009", "--fov", "40.67"]
 DISNEY_AZIMUTHS = {"front": "65,50", "side": "182,30", "back": "262,25"}
-QUALITIES = ("draft", "good", "final")
 DEPTHS = (0.05, 0.3, 1, 2, 4, 8, 16)
 
 
@@ -95,82 +96,13 @@ def scenes(options):
     for g in ("0.3", "0.85"):
         found += [Scene(f"depth_{g}_{depth}", "depth", "side", options.fog,
                         medium(depth / (10 / 3), 0.999, "hg:" + g, "90,38,3.6", "0,0,0"), parts=2) for depth in DEPTHS]
-    pbrt = "0.03,0.07,0.23"
-    found += [Scene(f"disney_{sun}", "disney", sun, options.fog,
-                    medium(4, 1, "hg:0.877", DISNEY_AZIMUTHS[sun] + ",2.6,2.5,2.3", pbrt), DISNEY_VIEW, 16) for sun in SUNS]
+    for name, extinction in (("disney", 0.3), ("dense", 4)):
+        found += [Scene(f"{name}_{sun}", name, sun, options.fog, medium(extinction, 1, "hg:0.877", DISNEY_AZIMUTHS[sun] + ",2.6,2.5,2.3",
+                                                                        "0.03,0.07,0.23"), DISNEY_VIEW, 16) for sun in SUNS]
     usual = "0.1,0.17,0.28"
-    for name, values in (("cumulus", (None, 0.99, "hg:0.3")), ("wisps", (None, 0.999, "hg:0.85")), ("droplets", (None, 0.9999, "mie:12"))):
-        dense = ["--density-scale", "3"] if name == "droplets" else []
-        found += [Scene(f"{name}_{sun}", name, sun, volumes[name], medium(*values, AZIMUTHS[sun] + ",3.6", usual) + dense, parts=16)
-                  for sun in SUNS]
+    for name, values in (("cumulus", (None, 0.99, "hg:0.3")), ("wisps", (None, 0.999, "hg:0.85")), ("droplets", (160, 0.9999, "mie:12"))):
+        found += [Scene(f"{name}_{sun}", name, sun, volumes[name], medium(*values, AZIMUTHS[sun] + ",3.6", usual), parts=16) for sun in SUNS]
     return [scene for scene in found if scene.group in options.what]
-
-
-class Picture:
-    """Red, green, blue and opacity, row by row."""
-
-    def __init__(self, planes):
-        self.planes = planes
-        r, g, b = planes[:3]
-        self.luminance = [0.2126 * x + 0.7152 * y + 0.0722 * z for x, y, z in zip(r, g, b)]
-        self.mean = sum(self.luminance) / len(self.luminance)
-        self.blocks = self.block_means(self.luminance)
-
-    @staticmethod
-    def read(path):
-        return Picture([compare_cycles.Plane(path, channel).values for channel in "RGBA"])
-
-    @staticmethod
-    def mean_of(pictures):
-        return Picture([[sum(values) / len(pictures) for values in zip(*(p.planes[c] for p in pictures))] for c in range(4)])
-
-    @staticmethod
-    def block_means(plane):
-        w, h = SIZE
-        return [sum(sum(plane[y * w + x:y * w + x + BLOCK]) for y in range(y0, y0 + BLOCK)) / BLOCK**2
-                for y0 in range(0, h - BLOCK + 1, BLOCK) for x in range(0, w, BLOCK)]
-
-
-class Reference:
-    """Two halves, and what they say together. One part alone counts as both halves."""
-
-    def __init__(self, parts):
-        self.first = Picture.mean_of(parts[0::2])
-        self.second = Picture.mean_of(parts[1::2]) if len(parts) > 1 else self.first
-        self.whole = Picture.mean_of(parts)
-        self.covered = [i for i, alpha in enumerate(Picture.block_means(self.whole.planes[3])) if alpha >= 0.5]
-        self.noise = self.rms_of_blocks(self.first, self.second) / 2
-
-    def rms_of_blocks(self, a, b):
-        return math.sqrt(sum(((a.blocks[i] - b.blocks[i]) / self.whole.blocks[i])**2 for i in self.covered) / len(self.covered))
-
-    def errors(self, picture):
-        """mean, rms, worst, relMSE."""
-        whole, squares, errors = self.whole, 0.0, []
-        for i in self.covered:
-            m, r = picture.blocks[i], whole.blocks[i]
-            squares += (m - self.first.blocks[i]) * (m - self.second.blocks[i]) / r**2
-            errors.append(m / r - 1)
-        relative = count = 0
-        for planes in zip(picture.planes[:3], whole.planes, self.first.planes, self.second.planes):
-            relative += sum((m - a) * (m - b) / (r * r + 0.01) for m, r, a, b in zip(*planes))
-            count += len(planes[0])
-        return {"mean": picture.mean / whole.mean - 1, "rms": math.sqrt(max(squares / len(errors), 0)),
-                "worst": max(errors, key=abs), "relmse": max(relative / count, 0)}
-
-    def own_errors(self):
-        """Those of the whole reference, from the difference of its halves: half of it is its standard error."""
-        a, b, whole = self.first, self.second, self.whole
-        relative = sum((x - y)**2 / 4 / (r * r + 0.01) for c in range(3) for x, y, r in zip(a.planes[c], b.planes[c], whole.planes[c]))
-        errors = [(a.blocks[i] - b.blocks[i]) / 2 / whole.blocks[i] for i in self.covered]
-        return {"mean": abs(a.mean - b.mean) / 2 / whole.mean, "rms": self.noise, "worst": max(errors, key=abs),
-                "relmse": relative / (3 * len(whole.luminance))}
-
-
-def inside(options, *parts):
-    path = os.path.join(options.folder, *parts)
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    return path
 
 
 def timed(command):
@@ -183,16 +115,6 @@ def timed(command):
     if process.returncode != 0:
         sys.exit(f"failed: {' '.join(command)}\n{printed}")
     return {"wall": time.perf_counter() - start, "processor": usage.ru_utime + usage.ru_stime}, printed
-
-
-def save(path, value):
-    with open(path, "w", encoding="utf-8") as file:
-        json.dump(value, file, indent=1)
-
-
-def load(path):
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
 
 
 def render(options, scene, name, extra, runs=1):
@@ -218,7 +140,7 @@ def march(options, scene):
     if scene.group in ("angle", "depth"):
         render(options, scene, f"march/{scene.name}_good", [])
         return
-    for quality in QUALITIES:
+    for quality in ("draft", "good", "final"):
         render(options, scene, f"march/{scene.name}_{quality}", ["--quality", quality], options.runs)
     render(options, scene, f"march/{scene.name}_path_16", ["--integrator", "path", "--spp", "16", "--seed", "1000"])
 
@@ -261,45 +183,9 @@ def cycles(options, scene):
         print(name, seconds, flush=True)
 
 
-def parts_of(options, scene):
-    parts, seconds = [], []
-    while os.path.exists(inside(options, f"parts/{scene.name}_{len(parts)}.exr")):
-        path = inside(options, f"parts/{scene.name}_{len(parts)}")
-        parts.append(Picture.read(path + ".exr"))
-        seconds.append(load(path + ".json") if os.path.exists(path + ".json") else {})
-    if not parts:
-        sys.exit(f"no reference of {scene.name}: --do trace makes it")
-    return parts, seconds
-
-
-def percent(value, signed=True):
-    return f"{100 * value:{'+' if signed else ''}.1f} %"
-
-
-def angle_table(options, found):
-    lines = ["| mean cosine | sun | mean | rms of blocks | worst block | noise of a block |", "|---|---|---|---|---|---|"]
-    for scene in found:
-        reference = Reference(parts_of(options, scene)[0])
-        e = reference.errors(Picture.read(inside(options, f"march/{scene.name}_good.exr")))
-        lines.append(f"| {scene.name.split('_')[1]} | {scene.sun} | {percent(e['mean'])} | {percent(e['rms'], False)} | "
-                     f"{percent(e['worst'])} | {percent(reference.noise, False)} |")
-    return lines
-
-
-def depth_table(options, found):
-    ratios = {}
-    for scene in found:
-        traced = Picture.mean_of(parts_of(options, scene)[0])
-        ratios[scene.name] = Picture.read(inside(options, f"march/{scene.name}_good.exr")).mean / traced.mean
-    lines = ["| optical depth of a voxel | " + " | ".join(map(str, DEPTHS)) + " |", "|---" * (len(DEPTHS) + 1) + "|"]
-    for g in ("0.3", "0.85"):
-        lines.append(f"| mean cosine {g} | " + " | ".join(f"{ratios[f'depth_{g}_{d}']:.3f}" for d in DEPTHS) + " |")
-    return lines
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    groups, steps = ("angle", "depth", "disney", "cumulus", "wisps", "droplets"), ("trace", "march", "cycles", "report")
+    groups, steps = ("angle", "depth", "disney", "dense", "cumulus", "wisps", "droplets"), ("trace", "march", "cycles", "report")
     parser.add_argument("program")
     parser.add_argument("folder")
     parser.add_argument("--what", nargs="+", choices=groups, default=groups)
@@ -310,6 +196,7 @@ def main():
     parser.add_argument("--cycles-samples", type=int, nargs="+", default=[16, 64])
     parser.add_argument("--fog", default=os.path.join(compare_cycles.SHARED, "volumes/wdas_cloud_sixteenth_fog.vdb"))
     parser.add_argument("--mesh", default=os.path.join(compare_cycles.SHARED, "meshes/bunny_60k.obj"))
+    parser.add_argument("--wall", action="store_true", help="seconds of what is marched are those of the wall, not half of the processors'")
     parser.add_argument("--page", help="Markdown page that the report goes into")
     options = parser.parse_args()
     options.program, options.folder = os.path.abspath(options.program), os.path.abspath(options.folder)
@@ -322,9 +209,7 @@ def main():
             for scene in found:
                 step(options, scene)
     if "report" in options.do:
-        for group, table in (("angle", angle_table), ("depth", depth_table)):
-            if group in options.what:
-                print("\n".join(table(options, [s for s in found if s.group == group])) + "\n")
+        reference_report.report(options, found)
 
 
 if __name__ == "__main__":
