@@ -32,6 +32,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "nephele/levelset/grid/large_buffer.h"
@@ -84,7 +85,9 @@ double reachedBricks(const std::vector<Vec3i>& occupied) {
 /// Density samples of a plane, the first of which stands at (u, v).
 struct LightVolume::Patch {
   int u = 0, v = 0;
-  bool empty = true;
+  /// Where it is set, all samples are this, and none is stored.
+  std::optional<float> constant = 0.0f;
+  bool isEmpty() const { return constant == 0.0f; }
   alignas(64) std::array<float, (kPatch + 2) * kPitch> samples{};
 };
 
@@ -121,21 +124,34 @@ struct LightVolume::Sweep {
     return b;
   }
 
+  // What all samples of a patch are, if its bricks are known to hold one value.
+  std::optional<float> constantOf(const Patch& patch, int bw) const {
+    std::optional<float> constant;
+    for (int bv = brickOf(patch.v); bv <= brickOf(patch.v + kPatch - 1); ++bv)
+      for (int bu = brickOf(patch.u); bu <= brickOf(patch.u + kPatch - 1); ++bu) {
+        const Interval& range = grid.ranges()[std::size_t(grid.poolIndex(bricks(bu, bv, bw)))];
+        const float least = std::max(range.min, 0.0f), most = std::max(range.max, 0.0f);
+        if (least != most || most != constant.value_or(most)) return std::nullopt;
+        constant = most;
+      }
+    return constant;
+  }
+
   // The samples of the plane w = k that the nodes (u0 .. u0 + 8, v0 .. v0 + 8) need, from half a slice
   // before to half a slice behind it. False if all are zero.
   bool load(int u0, int v0, int k, Patch& patch) const {
     patch.u = u0 + int(std::floor(slopeU * float(k))) - 2;
     patch.v = v0 + int(std::floor(slopeV * float(k))) - 2;
-    patch.empty = true;
     constexpr int size = BrickGrid::kBrick;
     const int bw = brickOf(k);
+    patch.constant = constantOf(patch, bw);
+    if (patch.constant) return !patch.isEmpty();
     for (int v1 = patch.v, vEnd = patch.v + kPatch; v1 < vEnd;) {
       const int bv = brickOf(v1), v2 = std::min(vEnd, (bv + 1) * size);
       for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
         const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
         const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
-        patch.empty = patch.empty && !holds;
         const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w] +
                             (insideBrick(u1) + 1) * sampleStride[u];
         const int count = u2 - u1;
@@ -153,7 +169,7 @@ struct LightVolume::Sweep {
       }
       v1 = v2;
     }
-    return !patch.empty;
+    return true;
   }
 
   // What any node of a brick of the lattice adds to its column at least, its first nodes at (u0, v0).
@@ -187,8 +203,8 @@ struct LightVolume::Sweep {
 
   // Densities where the nodes from (u0, v0) on pass w, at most half a slice from the patch.
   void interpolate(const Patch& patch, int u0, int v0, float atW, detail::SliceNodes& out) const {
-    if (patch.empty) {
-      out.fill(0.0f);
+    if (patch.constant) {
+      out.fill(*patch.constant);
       return;
     }
     const float shiftU = slopeU * atW, shiftV = slopeV * atW;
@@ -313,7 +329,7 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
     sweep.interpolate(*here, u0, v0, float(k), *at.density);
     for (int slice = 0; slice <= slices; ++slice, k += down) {
       // What the way to the next slice adds.
-      if (slice < slices && (sweep.load(u0, v0, k + down, *next) || !here->empty)) {
+      if (slice < slices && (sweep.load(u0, v0, k + down, *next) || !here->isEmpty())) {
         const float middle = float(k) + 0.5f * float(down);
         const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
         sweep.interpolate(*here, u0, v0, middle, halfHere);

@@ -225,7 +225,14 @@ float RenderVolume::typicalDensity() const {
   std::vector<Sums> bricks(occupied_.size());
   parallelFor(occupied_.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const float* values = density_->brick(density_->poolIndex(occupied_[i]));
+      const std::int32_t pool = density_->poolIndex(occupied_[i]);
+      if (const Interval& range = density_->ranges()[std::size_t(pool)]; range.isPoint()) {
+        constexpr double voxels = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
+        const double value = std::max(range.max, 0.0f);
+        bricks[i] = {voxels * value, voxels * value * value};
+        continue;
+      }
+      const float* values = density_->brick(pool);
       for (int z = 0; z != BrickGrid::kBrick; ++z)
         for (int y = 0; y != BrickGrid::kBrick; ++y) {
           float sum = 0, squares = 0;
