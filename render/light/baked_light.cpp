@@ -59,8 +59,10 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   suns.reserve(distant.size());
   for (const DistantLight& sun : distant) {
     progress.begin("light " + sun.name);
+    const bool changes = surfaces || sun.deepShadow || lights.deepTolerance;
     LightVolume& light =
-        suns.emplace_back(shading, sun.direction, LightVolume::Options{darkColumn(sun.shadow)}, progress);
+        suns.emplace_back(shading, sun.direction,
+                          LightVolume::Options{.dark = darkColumn(sun.shadow), .coded = !changes}, progress);
     shadowDeeply(volume, sun, light, progress);
     if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
     scene.suns.push_back(
@@ -82,11 +84,11 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
 
 // Last, when the floats have been read and what the light needed while it was made is given back.
 void BakedLight::code() {
-  scene.density.pairs = source->coded().pairs();
+  scene.density.codes = source->coded().codes();
   scene.density.entries = source->coded().entries();
   for (std::size_t i = 0; i != suns.size(); ++i) {
     suns[i].code();
-    scene.suns[i].pairs = suns[i].coded().pairs();
+    scene.suns[i].codes = suns[i].coded().codes();
     scene.suns[i].entries = suns[i].coded().entries();
   }
 }

@@ -232,18 +232,19 @@ LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const
   values_.assign(kVolume, 0.0f);
   if (volume.isEmpty()) return;
 
-  findBricks(volume, sweep);
+  makeRoom(findBricks(volume, sweep), options.coded);
   parallelFor(
       std::size_t(brickCount_.x) * brickCount_.y, 4,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t column = begin; column != end; ++column) fillColumn(sweep, column);
       },
       progress);
+  if (options.coded) coded_.setTable(table_);
 }
 
 // Numbers the bricks of the lattice that a density brick reaches: along the light just its own, across as far
-// as the shear within it takes.
-void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
+// as the shear within it takes. Returns how many there are.
+std::int32_t LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
   const auto reach = [&](const Vec3i& brick, int axis, float slope, int& first, int& last) {
     const float a = -slope * float(brick[sweep.w] * kBrick);
     const float b = -slope * float((brick[sweep.w] + 1) * kBrick);
@@ -276,10 +277,24 @@ void LightVolume::findBricks(const RenderVolume& volume, const Sweep& sweep) {
   std::int32_t next = hasDark ? 2 : 1;
   for (std::int32_t& brick : table_)
     if (brick != 0) brick = brick == kDarkBrick ? 1 : next++;
+  return next;
+}
+
+// With the bricks that hold one value.
+void LightVolume::makeRoom(std::int32_t bricks, bool coded) {
   values_ = {};
-  detail::resizeLarge(values_, std::size_t(next) * kVolume);
-  std::fill_n(values_.begin(), kVolume, 0.0f);
-  if (hasDark) std::fill_n(values_.begin() + kVolume, kVolume, dark_);
+  if (coded)
+    coded_ = CodedBricks(std::size_t(bricks));
+  else
+    detail::resizeLarge(values_, std::size_t(bricks) * kVolume);
+  for (std::int32_t pool = 0; pool != (dark_ < INFINITY ? 2 : 1); ++pool) {
+    std::array<float, kVolume> nodes;
+    nodes.fill(pool == 0 ? 0.0f : dark_);
+    if (coded)
+      coded_.set(pool, nodes.data());
+    else
+      std::copy(nodes.begin(), nodes.end(), values_.begin() + pool * kVolume);
+  }
 }
 
 // Marks what lies behind so much density, by the smallest of every brick, that it is dark.
@@ -314,6 +329,16 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
         table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
     return isStored(pool) ? pool : 0;
   };
+  // Nodes of the brick that is being worked out, before they are coded.
+  std::array<float, kVolume> own;
+  const auto store = [&](std::int32_t pool, int inside, const detail::SliceNodes& sum,
+                         const detail::Slices& at) {
+    float* nodes = values_.empty() ? own.data() : values_.data() + std::size_t(pool) * kVolume;
+    nodes += (sweep.fromAbove ? kBrick - inside : inside) * kWidth * kWidth;
+    // Less the mean error of interpolation along the light.
+    detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, nodes);
+    if (inside == kBrick && values_.empty()) coded_.set(pool, own.data());
+  };
   detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
   detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
   Patch patches[2];
@@ -341,8 +366,8 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
         at.next->fill(0.0f);
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
-      if (slice < slices) store(sweep, poolAt(brick), inside, sum, at);
-      if (slice > 0 && inside == 0) store(sweep, poolAt(brick - 1), kBrick, sum, at);
+      if (slice > 0 && inside == 0) store(poolAt(brick - 1), kBrick, sum, at);
+      if (slice < slices) store(poolAt(brick), inside, sum, at);
       detail::addSlice(*at.after, sum);
       std::swap(at.before, at.after);
       std::swap(at.previous, at.density);
@@ -352,17 +377,8 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
   });
 }
 
-// Writes one slice of a brick, `inside` slices from its face towards the light, less the mean error of
-// interpolation along the light.
-void LightVolume::store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
-                        const detail::Slices& at) {
-  const int slice = sweep.fromAbove ? kBrick - inside : inside;
-  float* out = values_.data() + (std::size_t(pool) * kWidth + std::size_t(slice)) * kWidth * kWidth;
-  detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, out);
-}
-
 void LightVolume::code() {
-  if (coded_.isEmpty()) coded_ = CodedBricks(std::exchange(values_, {}), table_);
+  if (!values_.empty()) coded_ = CodedBricks(std::exchange(values_, {}), table_);
 }
 
 float LightVolume::columnDensity(const Vec3f& world) const {
@@ -394,7 +410,7 @@ void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float>
   }
 }
 
-double LightVolume::estimateBytes(const RenderVolume& volume) {
+double LightVolume::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return 0;
   // Sheared by 45 degrees both ways, a brick and a node around it reach into at most 4 x 4 across; those of
   // bricks side by side are the same ones.
@@ -404,7 +420,8 @@ double LightVolume::estimateBytes(const RenderVolume& volume) {
     box = std::max(box, (2.0 * size[(w + 1) % 3] + 3) * (2.0 * size[(w + 2) % 3] + 3) * (size[w] + 1.0));
   // Two more are what is empty and what is dark.
   const double bricks = std::min(reachedBricks(volume.occupiedBricks()), box) + 2;
-  return bricks * kVolume * sizeof(float) + box * (sizeof(std::int32_t) + sizeof(CodedBricks::Entry));
+  return CodedBricks::estimateBytes(bricks, box) + box * sizeof(std::int32_t) +
+         (options.coded ? 0 : bricks * kVolume * sizeof(float));
 }
 
 }  // namespace nephele

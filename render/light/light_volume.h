@@ -37,6 +37,8 @@ class LightVolume {
     /// Columns beyond this need not be told apart: no light is left there. Bricks that lie wholly beyond it
     /// are not worked out, and hold this everywhere.
     float dark = std::numeric_limits<float>::infinity();
+    /// Codes bricks as they are worked out, in half the memory. Neither `replace` nor `addShade` may follow.
+    bool coded = false;
   };
 
   /// @param towards world-space direction towards the light, not zero.
@@ -61,11 +63,11 @@ class LightVolume {
   /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells. Empty once coded.
   const detail::UnsetVector<float>& values() const { return values_; }
 
-  /// Codes the values for the march, in their own memory: the last thing to do, since neither `replace` nor
+  /// Codes the values for the march, if they are not: the last thing to do, since neither `replace` nor
   /// `addShade` may follow. Uses all cores.
   /// @throws Error if there are more than 5.8 million bricks.
   void code();
-  /// Empty until `code`.
+  /// Empty until `code`, unless Options::coded.
   const CodedBricks& coded() const { return coded_; }
 
   /// Adds the shadow of opaque things within `box` to c: where a ray from the light, which starts outside of
@@ -84,17 +86,16 @@ class LightVolume {
   }
 
   /// Upper bound of the bytes that a light volume of `volume` takes, whatever the direction.
-  static double estimateBytes(const RenderVolume& volume);
+  static double estimateBytes(const RenderVolume& volume, const Options& options);
 
  private:
   struct Sweep;
   struct Patch;
 
-  void findBricks(const RenderVolume& volume, const Sweep& sweep);
+  std::int32_t findBricks(const RenderVolume& volume, const Sweep& sweep);
   void findDark(const Sweep& sweep);
   void fillColumn(const Sweep& sweep, std::size_t column);
-  void store(const Sweep& sweep, std::int32_t pool, int inside, const detail::SliceNodes& sum,
-             const detail::Slices& at);
+  void makeRoom(std::int32_t bricks, bool coded);
   bool isStored(std::int32_t pool) const { return pool > (dark_ < INFINITY ? 1 : 0); }
 
   Affine worldToLattice_;

@@ -6,8 +6,8 @@
 //
 // Steps are gathered into blocks of 32 that run across bricks. A block is looked up as vectors: brick table,
 // then the eight corners, in the density, in every sun's column densities and in the scattered light. The
-// first two are CodedBricks: what limits a sample is how many loads and shuffles it takes, and they need half
-// as many. Whatever does not have to wait for the densities stands beside what does.
+// first two are CodedBricks, half as many bytes to wait for. Whatever does not have to wait for the densities
+// stands beside what does.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE

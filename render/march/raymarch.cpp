@@ -54,8 +54,12 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
   const double others = (options.surfaces ? double(options.surfaces->memoryBytes()) : 0.0) +
                         (options.holdout ? double(options.holdout->memoryBytes()) : 0.0);
   const double perNode = double(lights.shadowDetail) * lights.shadowDetail * lights.shadowDetail;
+  const bool coded =
+      !options.surfaces && !lights.deepTolerance &&
+      std::ranges::none_of(lights.suns, [](const DistantLight& sun) { return bool(sun.deepShadow); });
   const double shadows =
-      perNode * (double(lights.suns.size() + std::size_t(spots)) * LightVolume::estimateBytes(volume) +
+      perNode * (double(lights.suns.size() + std::size_t(spots)) *
+                     LightVolume::estimateBytes(volume, {.coded = coded}) +
                  double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume));
   const double finer =
       perNode > 1 ? perNode * double(volume.occupiedBricks().size()) * BrickGrid::kVolume * sizeof(float) : 0;

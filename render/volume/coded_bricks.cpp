@@ -1,4 +1,4 @@
-// Bricks in 16 bits per node, two planes side by side.
+// Bricks in 16 bits per node.
 //
 // A code is the nearest whole number to value / unit, above kZero: with the unit a share of the brick's
 // largest value, codes hold 15.8 bits. That is relative to the brick, not to the volume, so that thin fringes
@@ -14,19 +14,19 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Codes the nodes of a brick, of which rows begin `row` and planes `plane` apart, and returns their unit.
-// `pairs` may be the nodes' own memory.
-float codeBrick(const float* nodes, std::size_t row, std::size_t plane, float* pairs) {
+float codeBrick(const float* nodes, std::size_t row, std::size_t plane, std::uint16_t* out) {
   using Lanes = hn::CappedTag<float, 16>;
   using Bits = hn::RebindToSigned<Lanes>;
   const Lanes d;
-  const Bits i;
-  constexpr std::size_t kWidth = CodedBricks::kWidth, kPlane = CodedBricks::kPlane;
+  constexpr std::size_t kWidth = CodedBricks::kWidth;
   constexpr std::size_t lanes = hn::MaxLanes(Lanes());
   constexpr std::size_t kRoom = CodedBricks::kNodes + lanes;
   // Side by side, and one of them again behind, so that all are whole vectors.
@@ -49,30 +49,15 @@ float codeBrick(const float* nodes, std::size_t row, std::size_t plane, float* p
   if (!(unit > 1e-30f / CodedBricks::kLargest)) unit = 0.0f;
   if (unit > 1e30f / CodedBricks::kLargest) unit = 1e30f / CodedBricks::kLargest;
   const auto inverse = hn::Set(d, unit > 0 ? 1 / unit : 0.0f), zero = hn::Set(d, CodedBricks::kZero);
-  alignas(64) std::int32_t codes[kRoom];
+  const hn::Rebind<std::uint16_t, Bits> narrow;
+  alignas(64) std::uint16_t codes[kRoom];
   for (std::size_t n = 0; n < CodedBricks::kNodes; n += lanes) {
     const auto scaled = hn::Add(hn::Mul(hn::Load(d, packed + n), inverse), zero);
     const auto code = hn::Min(hn::Max(scaled, hn::Zero(d)), hn::Set(d, 65535.0f));
-    hn::Store(hn::NearestInt(code), i, codes + n);
+    hn::StoreU(hn::DemoteTo(narrow, hn::NearestInt(code)), narrow, codes + n);
   }
-  std::size_t n = 0;
-  for (; n + lanes <= CodedBricks::kPairs; n += lanes)
-    hn::StoreU(
-        hn::BitCast(d, hn::Or(hn::Load(i, codes + n), hn::ShiftLeft<16>(hn::LoadU(i, codes + n + kPlane)))),
-        d, pairs + n);
-  for (const hn::CappedTag<float, 1> one; n != CodedBricks::kPairs; ++n) {
-    const hn::RebindToSigned<decltype(one)> bits;
-    hn::StoreU(hn::BitCast(one, hn::Set(bits, codes[n] | codes[n + kPlane] << 16)), one, pairs + n);
-  }
+  std::copy_n(codes, CodedBricks::kNodes, out);
   return unit;
-}
-
-// The same for as many bricks as there are units. Strides are those of bricks, rows and planes.
-void codeBricks(const float* nodes, const std::size_t (&strides)[3], float* pairs, std::size_t pairStride,
-                std::span<float> units) {
-  const auto [brick, row, plane] = strides;
-  for (std::size_t n = 0; n != units.size(); ++n)
-    units[n] = codeBrick(nodes + n * brick, row, plane, pairs + n * pairStride);
 }
 
 }  // namespace nephele::HWY_NAMESPACE
@@ -80,8 +65,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "nephele/levelset/grid/brick_grid.h"
@@ -91,80 +74,73 @@ HWY_AFTER_NAMESPACE();
 
 namespace nephele {
 
-HWY_EXPORT(codeBricks);
+HWY_EXPORT(codeBrick);
 
-namespace {
-
-// Units of the bricks.
-std::vector<float> code(const float* nodes, const std::size_t (&strides)[3], float* pairs,
-                        std::size_t pairStride, std::size_t count) {
-  std::vector<float> units(count);
-  parallelFor(count, 16, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(codeBricks)
-    (nodes + begin * strides[0], strides, pairs + begin * pairStride, pairStride,
-     std::span(units).subspan(begin, end - begin));
-  });
-  return units;
+CodedBricks::CodedBricks(std::size_t bricks) : units_(bricks) {
+  const std::size_t count = bricks * kNodes;
+  require(count <= std::size_t(UINT32_MAX), "march: more bricks than can be addressed");
+  codes_ = std::make_shared_for_overwrite<std::uint16_t[]>(count);
+  detail::useHugePages(codes_.get(), codes_.get() + count);
 }
 
-}  // namespace
+// From nodesOf(pool), of which rows and planes begin `strides` apart. In parts, done(begin, end) being told
+// of the bricks of each.
+template <class NodesOf, class Done>
+void CodedBricks::setAll(const std::size_t (&strides)[2], const NodesOf& nodesOf, const Done& done) {
+  constexpr std::size_t kTogether = 8192;
+  for (std::size_t first = 0; first < units_.size(); first += kTogether) {
+    const std::size_t last = std::min(first + kTogether, units_.size());
+    parallelFor(last - first, 16, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pool = first + begin; pool != first + end; ++pool)
+        units_[pool] = HWY_DYNAMIC_DISPATCH(codeBrick)(nodesOf(pool), strides[0], strides[1],
+                                                       codes_.get() + pool * kNodes);
+    });
+    done(first, last);
+  }
+}
 
-CodedBricks::CodedBricks(const BrickGrid& grid) : CodedBricks(grid, [](std::size_t, std::size_t) {}) {}
+CodedBricks::CodedBricks(const BrickGrid& grid) : CodedBricks(grid.poolSize()) {
+  constexpr std::size_t row = BrickGrid::kWidth;
+  setAll(
+      {row, row * row},
+      [&](std::size_t pool) { return grid.brick(std::int32_t(pool)) + sampleOffset(0, 0, 0); },
+      [](std::size_t, std::size_t) {});
+  setTable(grid.table());
+}
 
 CodedBricks CodedBricks::inPlaceOf(BrickGrid& grid) {
-  return CodedBricks(grid, [&](std::size_t begin, std::size_t end) {
-    detail::releasePages(grid.brick(std::int32_t(begin)), grid.brick(std::int32_t(end)));
-  });
-}
-
-// In parts, `done(begin, end)` being told of the bricks of each.
-template <class Done>
-CodedBricks::CodedBricks(const BrickGrid& grid, const Done& done) : floatCount_(grid.poolSize() * kPairs) {
-  constexpr std::size_t row = BrickGrid::kWidth, kTogether = 8192;
-  const std::shared_ptr<float[]> pairs = std::make_shared_for_overwrite<float[]>(floatCount_);
-  detail::useHugePages(pairs.get(), pairs.get() + floatCount_);
-  std::vector<float> units;
-  units.reserve(grid.poolSize());
-  for (std::size_t begin = 0; begin != grid.poolSize();) {
-    const std::size_t end = std::min(begin + kTogether, grid.poolSize());
-    const std::vector<float> some =
-        code(grid.brick(std::int32_t(begin)) + sampleOffset(0, 0, 0), {BrickGrid::kVolume, row, row * row},
-             pairs.get() + begin * kPairs, kPairs, end - begin);
-    units.insert(units.end(), some.begin(), some.end());
-    done(begin, end);
-    begin = end;
-  }
-  pairs_ = {pairs, pairs.get()};
-  enter(grid.table(), units, kPairs);
+  constexpr std::size_t row = BrickGrid::kWidth;
+  CodedBricks result(grid.poolSize());
+  result.setAll(
+      {row, row * row},
+      [&](std::size_t pool) { return grid.brick(std::int32_t(pool)) + sampleOffset(0, 0, 0); },
+      [&](std::size_t begin, std::size_t end) {
+        detail::releasePages(grid.brick(std::int32_t(begin)), grid.brick(std::int32_t(end)));
+      });
+  result.setTable(grid.table());
+  return result;
 }
 
 CodedBricks::CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table)
-    : floatCount_(nodes.size()) {
-  const auto pairs = std::make_shared<detail::UnsetVector<float>>(std::move(nodes));
-  float* data = pairs->data();
-  const std::vector<float> units = code(data, {kNodes, kWidth, kPlane}, data, kNodes, floatCount_ / kNodes);
-  pairs_ = {pairs, data};
-  enter(table, units, kNodes);
+    : CodedBricks(nodes.size() / kNodes) {
+  setAll(
+      {kWidth, kPlane}, [&](std::size_t pool) { return nodes.data() + pool * kNodes; },
+      [&](std::size_t begin, std::size_t end) {
+        detail::releasePages(nodes.data() + begin * kNodes, nodes.data() + end * kNodes);
+      });
+  setTable(table);
 }
 
-void CodedBricks::enter(std::span<const std::int32_t> table, const std::vector<float>& units,
-                        std::size_t stride) {
-  require(floatCount_ <= std::size_t(UINT32_MAX), "march: more bricks than can be addressed");
+void CodedBricks::set(std::int32_t pool, const float* nodes) {
+  units_[std::size_t(pool)] =
+      HWY_DYNAMIC_DISPATCH(codeBrick)(nodes, kWidth, kPlane, codes_.get() + std::size_t(pool) * kNodes);
+}
+
+void CodedBricks::setTable(std::span<const std::int32_t> table) {
+  entries_.clear();
   entries_.reserve(table.size());
   for (const std::int32_t pool : table)
-    entries_.push_back({std::uint32_t(std::size_t(pool) * stride), units[std::size_t(pool)]});
-}
-
-float CodedBricks::at(std::size_t place, const Vec3i& node) const {
-  const Entry& entry = entries_[place];
-  const int plane = std::min(node.z, kWidth - 2);
-  const auto bits = std::bit_cast<std::uint32_t>(
-      pairs_.get()[entry.first + std::size_t((plane * kWidth + node.y) * kWidth + node.x)]);
-  return (float(node.z == plane ? bits & 0xffffu : bits >> 16) - kZero) * entry.unit;
-}
-
-std::size_t CodedBricks::estimateBytes(const BrickGrid& grid) {
-  return grid.poolSize() * kPairs * sizeof(float) + grid.table().size() * sizeof(Entry);
+    entries_.push_back({std::uint32_t(std::size_t(pool) * kNodes), units_[std::size_t(pool)]});
 }
 
 }  // namespace nephele

@@ -13,8 +13,8 @@ namespace nephele {
 
 class BrickGrid;
 
-/// Bricks of 9^3 nodes in 16 bits each, as the march reads them: half the bytes of a float, and the eight
-/// corners of a cell in two loads of 64 bits.
+/// Bricks of 9^3 nodes in 16 bits each, as the march reads them: half the bytes of a float, and two corners
+/// of a cell in a load of 32 bits.
 ///
 /// A node is (code - kZero) * unit with a unit for every brick, so that it errs by at most half a unit: 1 /
 /// 114686 of the brick's largest value, and by less than a unit of the last place in bricks of one value. 0
@@ -25,11 +25,10 @@ class CodedBricks {
   static constexpr int kWidth = 9;
   static constexpr int kPlane = kWidth * kWidth;
   static constexpr int kNodes = kPlane * kWidth;
-  /// A pair for every node but those of the last plane: its code, and above it that of the next plane's.
-  static constexpr int kPairs = kNodes - kPlane;
   static constexpr float kZero = 8192.0f, kLargest = 65535.0f - kZero;
 
-  /// Of one place in the table of bricks: where its pairs begin, and its unit.
+  /// Of one place in the table of bricks: where its nodes begin, first axis fastest, and
+  /// its unit.
   struct Entry {
     std::uint32_t first;
     float unit;
@@ -37,39 +36,51 @@ class CodedBricks {
 
   CodedBricks() = default;
 
-  /// The nodes 0 to 8 of the bricks of a grid. Cost: one pass over its pool, all cores.
-  /// @throws Error if the grid has more bricks than can be addressed (5.8 million).
+  /// Room for a pool of so many bricks, each to be `set` once, and then to be placed by `setTable`.
+  /// @throws Error if they are more than can be addressed (5.8 million).
+  explicit CodedBricks(std::size_t bricks);
+  /// The nodes 0 to 8 of the bricks of a grid. Cost: one pass over its pool, all cores. @throws Error as
+  /// above.
   explicit CodedBricks(const BrickGrid& grid);
   /// The same, and gives the memory of the grid's samples back while it goes through them: they read as 0
   /// from then on. Ranges and layout stay.
   static CodedBricks inPlaceOf(BrickGrid& grid);
-
-  /// Takes the memory of `nodes`, kNodes for every pool brick, and codes them in place.
-  /// @throws Error as above.
+  /// The same of kNodes for every pool brick, whose memory is given back meanwhile.
   CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table);
 
+  /// Codes kNodes numbers, side by side. From several threads for different bricks.
+  void set(std::int32_t pool, const float* nodes);
+  /// Lets bricks stand at places.
+  void setTable(std::span<const std::int32_t> table);
+
   bool isEmpty() const { return entries_.empty(); }
-  /// Pairs, as the bits of floats.
-  const float* pairs() const { return pairs_.get(); }
+  const std::uint16_t* codes() const { return codes_.get(); }
   /// As many as the table of bricks has.
   const Entry* entries() const { return entries_.data(); }
-  /// The value at a node, 0 to 8 on every axis, of the brick at a place in the table. Slow; for tests.
-  float at(std::size_t place, const Vec3i& node) const;
-
-  /// Copies share their pairs.
-  std::size_t memoryBytes() const {
-    return floatCount_ * sizeof(float) + entries_.capacity() * sizeof(Entry);
+  /// The value at a node, 0 to 8 on every axis, of the brick at a place in the table. Slow.
+  float at(std::size_t place, const Vec3i& node) const {
+    const Entry& entry = entries_[place];
+    const auto inside = std::size_t((node.z * kWidth + node.y) * kWidth + node.x);
+    return (float(codes_.get()[entry.first + inside]) - kZero) * entry.unit;
   }
-  /// Those that a grid will take.
-  static std::size_t estimateBytes(const BrickGrid& grid);
+
+  /// Copies share their codes.
+  std::size_t memoryBytes() const {
+    return units_.size() * (kNodes * sizeof(std::uint16_t) + sizeof(float)) +
+           entries_.capacity() * sizeof(Entry);
+  }
+  /// Those that a pool of so many bricks at so many places takes.
+  static double estimateBytes(double bricks, double places) {
+    return bricks * (kNodes * sizeof(std::uint16_t) + sizeof(float)) + places * sizeof(Entry);
+  }
 
  private:
-  template <class Done>
-  CodedBricks(const BrickGrid& grid, const Done& done);
-  void enter(std::span<const std::int32_t> table, const std::vector<float>& units, std::size_t stride);
+  template <class NodesOf, class Done>
+  void setAll(const std::size_t (&strides)[2], const NodesOf& nodesOf, const Done& done);
 
-  std::shared_ptr<const float> pairs_;
-  std::size_t floatCount_ = 0;
+  // Made to be set and then shared.
+  std::shared_ptr<std::uint16_t[]> codes_;
+  std::vector<float> units_;
   std::vector<Entry> entries_;
 };
 

@@ -272,8 +272,10 @@ std::size_t RenderVolume::memoryBytes() const {
   for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
     for (const auto& grid : *grids) others += grid ? grid->memoryBytes() : 0;
   if (field_) others += field_->memoryBytes();
-  return density_->memoryBytes() + CodedBricks::estimateBytes(*density_) + others + emptiness_.size() +
-         uniformity_.size() + occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
+  const auto codedBytes =
+      std::size_t(CodedBricks::estimateBytes(double(density_->poolSize()), double(density_->table().size())));
+  return density_->memoryBytes() + codedBytes + others + emptiness_.size() + uniformity_.size() +
+         occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
 }
 
 }  // namespace nephele

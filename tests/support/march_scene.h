@@ -10,7 +10,7 @@ namespace nephele::test {
 inline MarchScene sceneOf(const RenderVolume& volume) {
   const BrickGrid& grid = volume.density();
   MarchScene scene;
-  scene.density = {grid.values().data(), grid.table().data(), grid.brickCount(), volume.coded().pairs(),
+  scene.density = {grid.values().data(), grid.table().data(), grid.brickCount(), volume.coded().codes(),
                    volume.coded().entries()};
   scene.ranges = grid.ranges().data();
   scene.emptiness = volume.emptiness().data();
@@ -29,7 +29,7 @@ struct SunColumns {
 inline MarchScene sceneOf(const RenderVolume& volume, const SunColumns& sun) {
   MarchScene scene = sceneOf(volume);
   scene.suns.push_back({{sun.light.values().data(), sun.light.table().data(), sun.light.brickCount(),
-                         sun.coded.coded().pairs(), sun.coded.coded().entries()}});
+                         sun.coded.coded().codes(), sun.coded.coded().entries()}});
   return scene;
 }
 

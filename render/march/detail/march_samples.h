@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/render/march/detail/march_lanes.h"
@@ -43,6 +44,40 @@ HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offs
     constexpr int quarter = int(hn::MaxLanes(D())) / 4;
     return hn::Combine(d, pairsAt(half, at + quarter, offset), pairsAt(half, at, offset));
   }
+#endif
+}
+
+// One vector of some that follow each other.
+template <class D, class Part>
+HWY_INLINE hn::Vec<D> joined([[maybe_unused]] D d, const Part* parts) {
+#if HWY_TARGET == HWY_SCALAR
+  return parts[0];
+#else
+  if constexpr (sizeof(hn::Vec<D>) == sizeof(Part))
+    return parts[0];
+  else
+    return hn::Combine(d, parts[1], parts[0]);
+#endif
+}
+
+// The 32 bits that lie `offset` codes behind at[n], for every lane.
+template <class D>
+HWY_INLINE hn::Vec<D> wordsAt([[maybe_unused]] D d, const std::uint16_t* const* HWY_RESTRICT at, int offset) {
+  constexpr int kCount = int(hn::MaxLanes(D()));
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128 && HWY_TARGET != HWY_SCALAR
+  if constexpr (kCount == 4) {
+    const auto two = [&](int n) HWY_ATTR {
+      return _mm_unpacklo_epi32(_mm_loadu_si32(at[n] + offset), _mm_loadu_si32(at[n + 1] + offset));
+    };
+    return hn::Vec<D>{_mm_castsi128_ps(_mm_unpacklo_epi64(two(0), two(2)))};
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, wordsAt(half, at + kCount / 2, offset), wordsAt(half, at, offset));
+  }
+#else
+  float words[kCount];
+  for (int n = 0; n != kCount; ++n) std::memcpy(words + n, at[n] + offset, sizeof(float));
+  return hn::LoadU(d, words);
 #endif
 }
 
@@ -166,47 +201,39 @@ HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
 // At places in coded bricks; nothing is below 0.
 HWY_INLINE Floats readCoded(const MarchScene::Bricks& bricks, const Places& places) {
   const Lanes d;
-  // As in Corners, the two rows of a cell; and what belongs to the brick.
-  Floats rows[2][2], entries[2];
-#if HWY_TARGET == HWY_SCALAR
-  const CodedBricks::Entry& entry = bricks.entries[places.entry[0]];
-  const float* at = bricks.pairs + (entry.first + std::uint32_t(places.node[0]));
-  for (int part = 0; part != 2; ++part) {
-    rows[0][part] = hn::Set(d, at[part]);
-    rows[1][part] = hn::Set(d, at[CodedBricks::kWidth + part]);
-    entries[part] = hn::Set(d, entry.unit);
-  }
-#else
-  static_assert(sizeof(CodedBricks::Entry) == 2 * sizeof(float));
-  for (int part = 0; part != 2; ++part) {
-    const float *at[kLanes / 2], *own[kLanes / 2];
-    for (int n = 0; n != kLanes / 2; ++n) {
-      const int lane = part * (kLanes / 2) + n;
+  constexpr int kRow = CodedBricks::kWidth, kPlane = CodedBricks::kPlane;
+  // As many at a time as addresses fit into registers.
+  constexpr int kTogether = kLanes < 8 ? kLanes : 8;
+  // Two nodes along x in each: of the four rows of a cell; and what belongs to the brick.
+  using Some = hn::CappedTag<float, kTogether>;
+  hn::Vec<Some> words[5][kLanes / kTogether];
+  for (int part = 0; part != kLanes / kTogether; ++part) {
+    const std::uint16_t *at[kTogether], *own[kTogether];
+    for (int n = 0; n != kTogether; ++n) {
+      const int lane = part * kTogether + n;
       const CodedBricks::Entry* entry = bricks.entries + inMemory(places.entry)[lane];
-      own[n] = reinterpret_cast<const float*>(entry);
-      at[n] = bricks.pairs + (entry->first + std::uint32_t(inMemory(places.node)[lane]));
+      own[n] = reinterpret_cast<const std::uint16_t*>(&entry->unit);
+      at[n] = bricks.codes + (entry->first + std::uint32_t(inMemory(places.node)[lane]));
     }
-    entries[part] = pairsAt(d, own, 0);
-    rows[0][part] = pairsAt(d, at, 0);
-    rows[1][part] = pairsAt(d, at, CodedBricks::kWidth);
+    for (int n = 0; n != 4; ++n) words[n][part] = wordsAt(Some(), at, n / 2 * kPlane + n % 2 * kRow);
+    words[4][part] = wordsAt(Some(), own, 0);
   }
-#endif
-  const auto alongZ = [&](Floats pairs) HWY_ATTR {
+  const auto alongX = [&](const hn::Vec<Some>* pairs) HWY_ATTR {
     const IntLanes i;
     const hn::RebindToUnsigned<Lanes> u;
-    const auto bits = hn::BitCast(u, pairs);
-    const Floats near = hn::ConvertTo(d, hn::BitCast(i, hn::And(bits, hn::Set(u, 0xffffu)))),
-                 far = hn::ConvertTo(d, hn::BitCast(i, hn::ShiftRight<16>(bits)));
-    return hn::MulAdd(places.share.z, hn::Sub(far, near), near);
-  };
-  const auto alongRow = [&](const Floats(&row)[2]) HWY_ATTR {
-    const Floats first = alongZ(firstOf(row[0], row[1])), second = alongZ(secondOf(row[0], row[1]));
+    const auto bits = hn::BitCast(u, joined(d, pairs));
+    const Floats first = hn::ConvertTo(d, hn::BitCast(i, hn::And(bits, hn::Set(u, 0xffffu)))),
+                 second = hn::ConvertTo(d, hn::BitCast(i, hn::ShiftRight<16>(bits)));
     return hn::MulAdd(places.share.x, hn::Sub(second, first), first);
   };
-  const Floats low = alongRow(rows[0]), high = alongRow(rows[1]);
-  const Floats code = hn::MulAdd(places.share.y, hn::Sub(high, low), low);
+  const auto alongY = [&](const hn::Vec<Some>* first, const hn::Vec<Some>* second) HWY_ATTR {
+    const Floats low = alongX(first), high = alongX(second);
+    return hn::MulAdd(places.share.y, hn::Sub(high, low), low);
+  };
+  const Floats near = alongY(words[0], words[1]), far = alongY(words[2], words[3]);
+  const Floats code = hn::MulAdd(places.share.z, hn::Sub(far, near), near);
   const Floats above = hn::Max(hn::Sub(code, hn::Set(d, CodedBricks::kZero)), hn::Zero(d));
-  return hn::Mul(above, secondOf(entries[0], entries[1]));
+  return hn::Mul(above, joined(d, words[4]));
 }
 
 // Places in coded bricks of as many samples as a block has, at distances s along a ray. All are found before

@@ -189,7 +189,33 @@ TEST(LightVolume, IsEmptyForAnEmptyVolume) {
 TEST(LightVolume, StaysWithinItsEstimate) {
   const RenderVolume volume(ball(1.0f, 0.05f));
   for (const Vec3f& towards : {Vec3f{0, 1, 0}, Vec3f{1, 1, 1}, Vec3f{-1, 0.5f, 0.9f}})
-    EXPECT_LE(double(LightVolume(volume, towards).memoryBytes()), LightVolume::estimateBytes(volume));
+    for (const LightVolume::Options& options : {LightVolume::Options{}, {.coded = true}})
+      EXPECT_LE(double(LightVolume(volume, towards, options).memoryBytes()),
+                LightVolume::estimateBytes(volume, options));
+}
+
+TEST(LightVolume, CodesTheSameWhileItWorksAndAfterwards) {
+  const RenderVolume volume(ball(1.0f, 0.05f));
+  for (const float dark : {0.3f, INFINITY})
+    for (const Vec3f& towards : {Vec3f{0, 1, 0}, Vec3f{-0.3f, -0.9f, 0.5f}, Vec3f{0.9f, 0.2f, -0.4f}}) {
+      LightVolume after(volume, towards, LightVolume::Options{.dark = dark});
+      const LightVolume floats = after, during(volume, towards, {.dark = dark, .coded = true});
+      after.code();
+      const std::size_t nodes = std::size_t(CodedBricks::kNodes);
+      EXPECT_TRUE(during.values().empty());
+      for (std::size_t place = 0; place != after.table().size(); ++place) {
+        const CodedBricks::Entry &a = after.coded().entries()[place], &b = during.coded().entries()[place];
+        ASSERT_EQ(a.unit, b.unit) << place;
+        ASSERT_TRUE(std::equal(after.coded().codes() + a.first, after.coded().codes() + a.first + nodes,
+                               during.coded().codes() + b.first))
+            << place;
+      }
+      // Half a unit of a brick's largest column, at most 2.
+      for (int i = 0; i != 500; ++i) {
+        const Vec3f p = Vec3f{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), std::cos(i * 0.7f)} * (i / 500.0f);
+        ASSERT_NEAR(during.columnDensity(p), floats.columnDensity(p), 2 * 0.51 / 57343) << i;
+      }
+    }
 }
 
 TEST(LightVolume, AddsTheShadowOfThingsToWhatIsBehindThem) {

@@ -91,7 +91,7 @@ TEST(CodedBricks, StayFiniteWhateverTheyHold) {
   });
 }
 
-TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
+TEST(CodedBricks, AreTheSameByAllInstructionsAndOfNodesSideBySide) {
   const auto grid = test::densityGrid(test::voxels(0.1f), {-20, -20, -20}, {20, 20, 20}, [](const Vec3f& p) {
     return std::sin(3 * p.x) * std::cos(4 * p.y) + std::sin(5 * p.z);
   });
@@ -105,18 +105,19 @@ TEST(CodedBricks, AreTheSameByAllInstructionsAndInTheirOwnMemory) {
         nodes.insert(nodes.end(), row, row + kWidth);
       }
   test::forEachTarget([&] {
-    const CodedBricks coded(*grid), inPlace(nodes, grid->table());
+    const CodedBricks coded(*grid), sideBySide(nodes, grid->table());
     for (std::size_t place = 0; place != grid->table().size(); ++place) {
       ASSERT_EQ(coded.entries()[place].first, expected.entries()[place].first);
       ASSERT_EQ(coded.entries()[place].unit, expected.entries()[place].unit);
-      ASSERT_EQ(inPlace.entries()[place].unit, expected.entries()[place].unit);
-      const float* pairs = expected.pairs() + expected.entries()[place].first;
-      const std::size_t bytes = CodedBricks::kPairs * sizeof(float);
-      ASSERT_EQ(std::memcmp(coded.pairs() + coded.entries()[place].first, pairs, bytes), 0);
-      ASSERT_EQ(std::memcmp(inPlace.pairs() + inPlace.entries()[place].first, pairs, bytes), 0);
+      ASSERT_EQ(sideBySide.entries()[place].unit, expected.entries()[place].unit);
+      const std::uint16_t* codes = expected.codes() + expected.entries()[place].first;
+      const std::size_t bytes = CodedBricks::kNodes * sizeof(std::uint16_t);
+      ASSERT_EQ(std::memcmp(coded.codes() + coded.entries()[place].first, codes, bytes), 0);
+      ASSERT_EQ(std::memcmp(sideBySide.codes() + sideBySide.entries()[place].first, codes, bytes), 0);
     }
   });
-  EXPECT_EQ(expected.memoryBytes(), CodedBricks::estimateBytes(*grid));
+  EXPECT_EQ(double(expected.memoryBytes()),
+            CodedBricks::estimateBytes(double(grid->poolSize()), double(grid->table().size())));
 }
 
 TEST(CodedBricks, TakeTheMemoryOfSamplesThatAreGivenUp) {
