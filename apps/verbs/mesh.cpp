@@ -43,7 +43,7 @@ void makeMesh(const MeshOptions& options, Run& run) {
   writeMesh(options.output, mesh);
 
   run.begin("check");
-  const MeshDiagnosis is = diagnose(mesh);
+  const MeshDiagnosis is = diagnose(mesh, run);
   run.stats["mesh"].update({{"vertices", is.vertices},
                             {"faces", is.faces},
                             {"triangles", is.triangles},

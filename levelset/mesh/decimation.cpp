@@ -47,26 +47,26 @@ constexpr double kThin = 0.03;
 // Share of its length that an edge costs on top of the distance, so that flat places lose short edges first.
 constexpr double kLengthCost = 1e-3;
 // Turns between two looks at whether all is cancelled; late ones measure thousands of points each.
-constexpr std::size_t kTurnsUnheard = 64;
+constexpr std::size_t kTurnsUnheard = 64, kFacesUnheard = 1 << 14;
 // What measured distances may be of the bound, which leaves room for what lies between the points measured.
 constexpr double kAllowance = 0.75;
 
 class Decimation {
  public:
-  Decimation(const Mesh& welded, double bound)
+  Decimation(const Mesh& welded, double bound, const Progress& progress)
       : source_(welded),
         origin_(welded.positions[welded.corners[0]]),
-        mesh_(detail::halfEdgesOf(welded, origin_, "decimation")),
+        mesh_(detail::halfEdgesOf(welded, {origin_, "decimation"}, progress)),
         wedges_(welded),
         bound_(bound),
-        nearest_(centred()),
+        nearest_(centred(), progress),
         quadrics_(welded.positions.size()),
         nextPoint_(welded.positions.size(), kNone),
         firstPoint_(welded.faceCount(), kNone),
         turns_(welded.positions.size()),
         faceCount_(welded.faceCount()) {
     for (const Vertex v : mesh_.vertices()) old_.push_back(mesh_.point(v));
-    setQuadrics();
+    setQuadrics(progress);
   }
 
   void run(std::size_t target, const Progress& progress) {
@@ -126,7 +126,7 @@ class Decimation {
                           mesh_.to_vertex_handle(h).idx());
   }
 
-  void setQuadrics();
+  void setQuadrics(const Progress& progress);
   bool isLegal(HalfEdge h);
   bool findRim(HalfEdge h);
   double distanceFromOld(double limit);
@@ -166,7 +166,7 @@ class Decimation {
   std::vector<std::pair<double, HalfEdge>> candidates_;
 };
 
-void Decimation::setQuadrics() {
+void Decimation::setQuadrics(const Progress& progress) {
   for (Quadric& q : quadrics_) q.clear();
   const auto add = [&](Vertex v, const Point& normal, double weight) {
     Quadric q(normal[0], normal[1], normal[2], -(mesh_.point(v) | normal));
@@ -175,6 +175,7 @@ void Decimation::setQuadrics() {
   };
   double lengths = 0;
   for (const Face f : mesh_.faces()) {
+    if (std::size_t(f.idx()) % kFacesUnheard == 0) progress.check();
     const Point normal = mesh_.calc_normal(f);
     for (const HalfEdge h : mesh_.fh_range(f)) {
       const Vertex from = mesh_.from_vertex_handle(h), to = mesh_.to_vertex_handle(h);
@@ -428,11 +429,10 @@ DecimatedMesh decimate(const Mesh& mesh, const DecimationOptions& options, const
     require(isFinite(mesh.positions[v]), "decimation: the mesh has positions that are not finite");
   const std::size_t target = options.faces.value_or(0);
   if (!options.maxError && triangulated(mesh).faceCount() <= target) return {mesh, 0.0};
-  const Mesh welded = detail::weldedTriangles(mesh);
-  require(welded.faceCount() > 0, "decimation: all faces repeat a corner");
   progress.begin("decimate");
-  progress.check();
-  Decimation decimation(welded, kAllowance * kAllowance * bound * bound);
+  const Mesh welded = detail::weldedTriangles(mesh, progress);
+  require(welded.faceCount() > 0, "decimation: all faces repeat a corner");
+  Decimation decimation(welded, kAllowance * kAllowance * bound * bound, progress);
   decimation.run(target, progress);
   return decimation.result();
 }

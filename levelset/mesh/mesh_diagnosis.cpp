@@ -26,6 +26,9 @@ struct EdgeUse {
   bool ascending;        // runs from the smaller to the larger vertex
 };
 
+// Vertices between two looks at whether all is cancelled: some ten milliseconds.
+constexpr std::uint32_t kVerticesUnheard = 1 << 16;
+
 std::string counted(std::size_t count, const char* one, const char* many) {
   return fmt::format("{} {}", count, count == 1 ? one : many);
 }
@@ -87,12 +90,14 @@ std::size_t countDuplicates(const Mesh& mesh, std::span<const std::uint32_t> ver
 
 }  // namespace
 
-MeshDiagnosis diagnose(const Mesh& mesh) {
+MeshDiagnosis diagnose(const Mesh& mesh, const Progress& progress) {
   requireValid(mesh);
+  progress.check();
   MeshDiagnosis d;
   const std::size_t positionCount = mesh.positions.size();
   const std::vector<std::uint32_t> vertexOf = firstEqualPosition(mesh.positions);
 
+  progress.check();
   d.faces = mesh.faceCount();
   for (std::size_t f = 0; f < d.faces; ++f) {
     const auto face = mesh.face(f);
@@ -110,11 +115,14 @@ MeshDiagnosis diagnose(const Mesh& mesh) {
   d.vertices = static_cast<std::size_t>(std::count(vertexUsed.begin(), vertexUsed.end(), true));
   d.mergedVertices = usedPositions - d.vertices;
   d.unusedVertices = positionCount - usedPositions;
+  progress.check();
   d.duplicateFaces = countDuplicates(mesh, vertexOf);
+  progress.check();
   d.volume = signedVolume(mesh);
   d.area = surfaceArea(mesh);
   d.box = boundingBox(mesh);
 
+  progress.check();
   // Edge uses, gathered at the smaller vertex.
   std::vector<std::uint32_t> start(positionCount + 1);
   const auto forEachSide = [&](const auto& visit) {
@@ -146,6 +154,7 @@ MeshDiagnosis diagnose(const Mesh& mesh) {
   std::vector<bool> onBoundary(positionCount);
   std::size_t edges = 0;
   for (std::uint32_t v = 0; v < positionCount; ++v) {
+    if (v % kVerticesUnheard == 0) progress.check();
     const auto first = uses.begin() + start[v], last = uses.begin() + start[v + 1];
     std::sort(first, last, [](const EdgeUse& a, const EdgeUse& b) {
       return a.larger != b.larger ? a.larger < b.larger : a.corner < b.corner;

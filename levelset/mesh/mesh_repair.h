@@ -43,8 +43,9 @@ struct MeshDiagnosis {
   std::vector<std::string> problems() const;
 };
 
-/// Linear in the size of the mesh; self-intersections are not looked for here.
-MeshDiagnosis diagnose(const Mesh& mesh);
+/// Linear in the size of the mesh; self-intersections are not looked for here. `progress` only cancels.
+/// @throws Cancelled
+MeshDiagnosis diagnose(const Mesh& mesh, const Progress& progress = silent());
 
 /// Pairs of triangles that intersect beyond what they share (exact predicates; triangles without area left
 /// out). Any soup. Nothing where the library was built without CGAL, or where more pairs than a million and

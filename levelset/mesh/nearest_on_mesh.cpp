@@ -67,7 +67,7 @@ struct NearestOnMesh::Hierarchy {
   }
 };
 
-NearestOnMesh::NearestOnMesh(const Mesh& mesh)
+NearestOnMesh::NearestOnMesh(const Mesh& mesh, const Progress& progress)
     : hierarchy_(std::make_unique<Hierarchy>()), box_(boundingBox(requireValid(mesh))) {
   detail::requireTriangles(mesh);
   Hierarchy& h = *hierarchy_;
@@ -93,7 +93,13 @@ NearestOnMesh::NearestOnMesh(const Mesh& mesh)
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(h.scene, geometry);
   rtcReleaseGeometry(geometry);
+  rtcSetSceneProgressMonitorFunction(
+      h.scene, [](void* p, double) { return !static_cast<const Progress*>(p)->cancelled(); },
+      const_cast<Progress*>(&progress));
+  progress.check();
   rtcCommitScene(h.scene);
+  progress.check();
+  rtcSetSceneProgressMonitorFunction(h.scene, nullptr, nullptr);
   require(rtcGetDeviceError(h.device) == RTC_ERROR_NONE, "closest point: Embree cannot build its hierarchy");
 }
 

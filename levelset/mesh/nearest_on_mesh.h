@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/field/field.h"
 
 namespace nephele {
@@ -13,8 +14,9 @@ namespace nephele {
 /// hierarchy. Any soup of triangles fits. Safe to use from many threads.
 class NearestOnMesh {
  public:
-  /// Cost: n log n in the number of triangles. @throws Error if the mesh has no faces or is not triangulated.
-  explicit NearestOnMesh(const Mesh& mesh);
+  /// Cost: n log n in the number of triangles; `progress` only cancels.
+  /// @throws Error if the mesh has no faces or is not triangulated; Cancelled
+  explicit NearestOnMesh(const Mesh& mesh, const Progress& progress = silent());
   ~NearestOnMesh();
   NearestOnMesh(const NearestOnMesh&) = delete;
   NearestOnMesh& operator=(const NearestOnMesh&) = delete;

@@ -38,10 +38,10 @@ struct Neighbours {
 
 Mesh smoothed(const Mesh& mesh, const SmoothingOptions& options, const Progress& progress) {
   require(options.rounds >= 1, fmt::format("smoothing: rounds must be >= 1, got {}", options.rounds));
-  const Mesh welded = detail::weldedTriangles(mesh);
-  require(welded.faceCount() > 0, "smoothing: the mesh has no faces");
   progress.begin("smooth");
-  const Neighbours neighbours(detail::halfEdgesOf(welded, {}, "smoothing"));
+  const Mesh welded = detail::weldedTriangles(mesh, progress);
+  require(welded.faceCount() > 0, "smoothing: the mesh has no faces");
+  const Neighbours neighbours(detail::halfEdgesOf(welded, {.what = "smoothing"}, progress));
   std::vector<Vec3d> positions = mesh.positions, next = positions;
   for (int step = 0; step < 2 * options.rounds; ++step) {
     progress.check();

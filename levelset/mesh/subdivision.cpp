@@ -82,14 +82,16 @@ MeshAttribute ofVertices(const MeshAttribute& a, const HalfEdgeMesh& mesh) {
   return result;
 }
 
-Mesh subdividedOnce(const Mesh& mesh) {
+Mesh subdividedOnce(const Mesh& mesh, const Progress& progress) {
   const Vec3d origin = mesh.positions[mesh.corners[0]];
-  const HalfEdgeMesh half = detail::halfEdgesOf(mesh, origin, "subdivision");
+  const HalfEdgeMesh half = detail::halfEdgesOf(mesh, {origin, "subdivision"}, progress);
+  progress.check();
   Mesh result;
   result.positions.reserve(half.n_vertices() + half.n_edges());
   for (const auto v : half.vertices())
     result.positions.push_back(detail::toVec3d(movedVertex(half, v)) + origin);
   for (const auto e : half.edges()) result.positions.push_back(detail::toVec3d(edgePoint(half, e)) + origin);
+  progress.check();
   result.corners.reserve(4 * mesh.corners.size());
   result.faceStart.reserve(4 * mesh.faceCount() + 1);
   for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
@@ -103,9 +105,11 @@ Mesh subdividedOnce(const Mesh& mesh) {
     for (const auto& part : kParts)
       result.addFace(std::array<std::uint32_t, 3>{point[part[0]], point[part[1]], point[part[2]]});
   }
-  for (const MeshAttribute& a : mesh.attributes)
+  for (const MeshAttribute& a : mesh.attributes) {
+    progress.check();
     result.attributes.push_back(a.domain == MeshAttribute::Domain::corner ? ofCorners(a, mesh.faceCount())
                                                                           : ofVertices(a, half));
+  }
   result.groups = mesh.groups;
   for (MeshGroup& group : result.groups) {
     group.firstFace *= 4;
@@ -127,7 +131,7 @@ Mesh subdivided(const Mesh& mesh, int times, const Progress& progress) {
   require(times >= 0, fmt::format("subdivision: it can be done 0 times or more, got {}", times));
   requireValid(mesh);
   if (times == 0) return mesh;
-  Mesh result = detail::weldedTriangles(mesh);
+  Mesh result = detail::weldedTriangles(mesh, progress);
   require(result.faceCount() > 0, "subdivision: the mesh has no faces");
   const double corners = double(result.corners.size()) * std::pow(4.0, times);
   require(corners < double(1u << 31),
@@ -136,7 +140,7 @@ Mesh subdivided(const Mesh& mesh, int times, const Progress& progress) {
   progress.begin("subdivide");
   for (int i = 0; i < times; ++i) {
     progress.check();
-    result = subdividedOnce(result);
+    result = subdividedOnce(result, progress);
     progress.advance(std::pow(4.0, i + 1 - times));
   }
   return result;

@@ -7,6 +7,7 @@
 // clang-format on
 
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
 
 // OpenMesh as the half-edge structure of mesh processing. Not for other folders.
 namespace nephele::detail {
@@ -30,11 +31,19 @@ inline Vec3d toVec3d(const OpenMesh::Vec3d& p) {
 
 /// The triangles of `mesh` with corners at the first of equal positions; triangles that repeat a corner are
 /// left out. Positions stay as they are, so that some are not used.
-Mesh weldedTriangles(const Mesh& mesh);
+/// @throws Cancelled
+Mesh weldedTriangles(const Mesh& mesh, const Progress& progress);
 
-/// The same vertices and faces in the same order, `origin` subtracted from the positions.
-/// @throws Error that begins with `what` if the triangles are none that a half-edge structure can hold: an
-/// edge with more than two faces, or two that run the same way, or a vertex with several fans.
-HalfEdgeMesh halfEdgesOf(const Mesh& welded, const Vec3d& origin, const char* what);
+struct HalfEdgeOptions {
+  /// Subtracted from the positions.
+  Vec3d origin{};
+  /// What asks; messages begin with it.
+  const char* what = "";
+};
+
+/// The same vertices and faces in the same order.
+/// @throws Error if the triangles are none that a half-edge structure can hold: an edge with more than two
+/// faces, or two that run the same way, or a vertex with several fans; Cancelled.
+HalfEdgeMesh halfEdgesOf(const Mesh& welded, const HalfEdgeOptions& options, const Progress& progress);
 
 }  // namespace nephele::detail

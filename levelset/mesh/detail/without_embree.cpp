@@ -29,8 +29,10 @@ struct NearestOnMesh::Hierarchy {
   std::optional<detail::TriangleTree> tree;
 };
 
-NearestOnMesh::NearestOnMesh(const Mesh& mesh) : box_(boundingBox(requireValid(mesh))) {
+NearestOnMesh::NearestOnMesh(const Mesh& mesh, const Progress& progress)
+    : box_(boundingBox(requireValid(mesh))) {
   detail::requireTriangles(mesh);
+  progress.check();
   hierarchy_ = std::make_unique<Hierarchy>(mesh);
 }
 

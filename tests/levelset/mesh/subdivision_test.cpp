@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <functional>
 
+#include "nephele/levelset/mesh/decimation.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/levelset/mesh/smoothing.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_topology.h"
@@ -141,6 +146,34 @@ TEST(Smoothing, BordersAreSmoothedAlongThemselves) {
   EXPECT_NEAR(length(result.positions[1] - Vec3d(1, -0.25 / 1.9, 0)), 0, 1e-12);
   for (const Vec3d& p : result.positions) EXPECT_EQ(p.z, 0);
   EXPECT_THROW(smoothed(square, {.rounds = 0}), Error);
+}
+
+// Half-edges, diagnoses and trees of large meshes take most of a second: work that is cancelled between two
+// of its looks ends at the next one, whichever that is, and the first looks are before a round or turn is
+// done.
+TEST(MeshProcessing, StopsWhileItPreparesItself) {
+  struct Stop final : Progress {
+    explicit Stop(int count) : after(count) {}
+    int after;
+    mutable std::atomic<int> looks{0}, advances{0};
+    bool cancelled() const override { return ++looks > after; }
+    void advance(double) const override { ++advances; }
+  };
+  const Mesh ball = test::icosphere(1.0, 5);
+  const std::function<void(const Progress&)> all[] = {
+      [&](const Progress& p) { diagnose(ball, p); },
+      [&](const Progress& p) { NearestOnMesh(ball, p); },
+      [&](const Progress& p) { smoothed(ball, {.rounds = 1}, p); },
+      [&](const Progress& p) { subdivided(ball, 1, p); },
+      [&](const Progress& p) { decimate(ball, {.faces = 100}, p); },
+  };
+  const int expected[] = {5, 2, 10, 10, 10};
+  for (std::size_t i = 0; i < std::size(all); ++i)
+    for (int after = 0; after < expected[i]; ++after) {
+      const Stop stop(after);
+      EXPECT_THROW(all[i](stop), Cancelled) << i << ", look " << after;
+      EXPECT_EQ(stop.advances, 0) << i << ", look " << after;
+    }
 }
 
 }  // namespace
