@@ -180,4 +180,51 @@ DeepImage readDeepExr(const std::string& path, double mostBytes) {
   }
 }
 
+void detail::readDeepRows(const std::string& path, const ImageReader& reader) {
+  const ExrCheck check = checkExr(path);
+  Imf::MultiPartInputFile file(path.c_str());
+  const Imf::Header& header = file.header(0);
+  const ImageHeader image = imageHeader(path, header);
+  require(header.hasType() && header.type() == Imf::DEEPSCANLINE,
+          path + ": is a tiled deep image; only scan lines are read");
+  reader.begin(image);
+
+  std::int64_t bytesPerSample = 0;
+  for (auto i = header.channels().begin(); i != header.channels().end(); ++i)
+    bytesPerSample += i.channel().type == Imf::HALF ? 2 : 4;
+  std::int64_t samplesLeft = check.sampleBytes / bytesPerSample;
+  Imf::DeepScanLineInputPart part(file, 0);
+  const Imath::Box2i window = header.dataWindow();
+  const auto width = std::size_t(image.width);
+  std::vector<unsigned> counts(width);
+  std::vector<std::vector<float>> values(image.channels.size());
+  std::vector<std::vector<char*>> pointers(values.size(), std::vector<char*>(width));
+  for (int y = window.min.y; y <= window.max.y; ++y) {
+    Imf::DeepFrameBuffer frame;
+    frame.insertSampleCountSlice(
+        Imf::Slice(Imf::UINT, reinterpret_cast<char*>(counts.data() - window.min.x), sizeof(unsigned), 0));
+    for (std::size_t c = 0; c != values.size(); ++c)
+      frame.insert(image.channels[c].name,
+                   Imf::DeepSlice(Imf::FLOAT, reinterpret_cast<char*>(pointers[c].data() - window.min.x),
+                                  sizeof(char*), 0, sizeof(float)));
+    part.setFrameBuffer(frame);
+    part.readPixelSampleCounts(y, y);
+    std::size_t total = 0;
+    for (const unsigned count : counts) {
+      total += count;
+      samplesLeft -= std::int64_t(count);
+      require(samplesLeft >= 0, path + ": is damaged: pixels have more samples than it holds");
+    }
+    for (std::size_t c = 0; c != values.size(); ++c) {
+      // One more, so that pixels without samples have an address too.
+      values[c].resize(total + 1);
+      float* next = values[c].data();
+      for (std::size_t x = 0; x != width; next += counts[x++]) pointers[c][x] = reinterpret_cast<char*>(next);
+    }
+    part.readPixels(y, y);
+    for (std::vector<float>& channel : values) channel.resize(total);
+    reader.deepRow(counts, values);
+  }
+}
+
 }  // namespace nephele

@@ -82,8 +82,10 @@ const char* typeName(Imf::PixelType type) {
   return type == Imf::HALF ? "half" : type == Imf::FLOAT ? "float" : "uint32";
 }
 
-detail::ImageHeader headerOf(const std::string& path, const Imf::Header& header) {
-  detail::ImageHeader result;
+}  // namespace
+
+detail::ImageHeader detail::imageHeader(const std::string& path, const Imf::Header& header) {
+  ImageHeader result;
   result.format = "OpenEXR";
   const Imath::Box2i& window = header.dataWindow();
   const long long width = (long long)(window.max.x) - window.min.x + 1,
@@ -94,7 +96,7 @@ detail::ImageHeader headerOf(const std::string& path, const Imf::Header& header)
             fmt::format("{}: channel {} is subsampled, which is not read", path, i.name()));
     if (channels < 4096) result.channels.push_back({i.name(), typeName(i.channel().type)});
   }
-  detail::requireSize(path, width, height, channels);
+  requireSize(path, width, height, channels);
   result.width = int(width);
   result.height = int(height);
   const Imath::Box2i& screen = header.displayWindow();
@@ -110,8 +112,6 @@ detail::ImageHeader headerOf(const std::string& path, const Imf::Header& header)
       result.attributes.emplace_back(i.name(), text);
   return result;
 }
-
-}  // namespace
 
 Imath::Box2i detail::dataWindow(int width, int height, const std::optional<Image::Display>& display) {
   const Image::Display d = display.value_or(Image::Display{0, 0, width, height});
@@ -198,9 +198,11 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
 
 void detail::readExrFile(const std::string& path, const ImageReader& reader) {
   try {
-    require(!checkExr(path).isDeep, path + ": is a deep image, where a flat one is needed");
+    const bool isDeep = checkExr(path).isDeep;
+    if (isDeep && reader.deepRow) return readDeepRows(path, reader);
+    require(!isDeep, path + ": is a deep image, where a flat one is needed");
     Imf::InputFile file(path.c_str());
-    const ImageHeader header = headerOf(path, file.header());
+    const ImageHeader header = imageHeader(path, file.header());
     reader.begin(header);
 
     // In bands: the size in a damaged header is not to be believed before its pixels arrive.

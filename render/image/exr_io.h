@@ -53,8 +53,9 @@ enum class ColourEncoding {
 Image readLinearImage(const std::string& path, ColourEncoding encoding = ColourEncoding::automatic,
                       double mostBytes = std::numeric_limits<double>::infinity());
 
-/// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes.
-/// Reads every pixel. @throws Error as readImage does.
+/// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes;
+/// of deep OpenEXR files of scan lines also the number of samples. Reads every pixel.
+/// @throws Error as readImage does.
 std::vector<std::string> describeImage(const std::string& path);
 
 }  // namespace nephele

@@ -129,25 +129,42 @@ std::vector<std::string> describeImage(const std::string& path) {
   };
   detail::ImageHeader header;
   std::vector<Range> ranges;
-  detail::readFile(path, {[&](const detail::ImageHeader& h) {
-                            header = h;
-                            ranges.resize(h.channels.size());
-                          },
-                          [&](int, const float* values) {
-                            for (int x = 0; x != header.width; ++x)
-                              for (Range& range : ranges) {
-                                const float value = *values++;
-                                if (std::isfinite(value)) {
-                                  range.low = std::min(range.low, value);
-                                  range.high = std::max(range.high, value);
-                                } else {
-                                  ++range.notFinite;
-                                }
-                              }
-                          }});
+  const auto add = [](Range& range, float value) {
+    if (std::isfinite(value)) {
+      range.low = std::min(range.low, value);
+      range.high = std::max(range.high, value);
+    } else {
+      ++range.notFinite;
+    }
+  };
+  bool isDeep = false;
+  std::size_t samples = 0, most = 0, empty = 0;
+  detail::readFile(path,
+                   {[&](const detail::ImageHeader& h) {
+                      header = h;
+                      ranges.resize(h.channels.size());
+                    },
+                    [&](int, const float* values) {
+                      for (int x = 0; x != header.width; ++x)
+                        for (Range& range : ranges) add(range, *values++);
+                    },
+                    [&](std::span<const unsigned> counts, std::span<const std::vector<float>> channels) {
+                      isDeep = true;
+                      for (const std::size_t count : counts) {
+                        samples += count;
+                        most = std::max(most, count);
+                        empty += count == 0 ? 1 : 0;
+                      }
+                      for (std::size_t c = 0; c != channels.size(); ++c)
+                        for (const float value : channels[c]) add(ranges[c], value);
+                    }});
   const std::size_t count = header.channels.size();
-  std::vector<std::string> lines{fmt::format("image {} x {}, {} channel{}, {}", header.width, header.height,
-                                             count, count == 1 ? "" : "s", header.format)};
+  std::vector<std::string> lines{fmt::format("{}image {} x {}, {} channel{}, {}", isDeep ? "deep " : "",
+                                             header.width, header.height, count, count == 1 ? "" : "s",
+                                             header.format)};
+  if (isDeep)
+    lines.push_back(fmt::format("samples: {}, {:.3g} per pixel, {} at most; {} pixels have none", samples,
+                                double(samples) / (double(header.width) * header.height), most, empty));
   std::set<std::string> layers;
   for (std::size_t c = 0; c != count; ++c) {
     const std::string& name = header.channels[c].name;

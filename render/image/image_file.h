@@ -3,6 +3,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,10 @@ struct ImageHeader {
 struct ImageReader {
   std::function<void(const ImageHeader&)> begin;
   std::function<void(int y, const float* values)> row;
+  /// Rows of deep images, from the top: the samples of each pixel, and for each channel its values, pixel
+  /// after pixel. Without it deep images are refused.
+  std::function<void(std::span<const unsigned> counts, std::span<const std::vector<float>> channels)>
+      deepRow{};
 };
 
 /// Each reads a whole file. @throws Error naming the path and what is wrong.

@@ -120,6 +120,26 @@ TEST(DeepImage, IsWrittenAndReadAgain) {
   EXPECT_THROW(readDeepExr(folder.file("cut.exr")), Error);
 }
 
+TEST(DeepImage, IsDescribedByItsSamples) {
+  DeepImage image{.width = 3, .height = 2, .pixels = std::vector<std::vector<DeepSample>>(6)};
+  image.pixels[1] = {{.z = 2, .zBack = 3, .alpha = 0.5f, .colour = {0.25f, 0, 0}}};
+  image.pixels[5] = {{.z = 1.5f, .zBack = 2, .alpha = 0.25f, .colour = {0, 0, 0}},
+                     {.z = 4, .zBack = 7, .alpha = 1, .colour = {0.5f, 0, 0}}};
+  const TemporaryFolder folder;
+  writeDeepExr(folder.file("deep.exr"), image, front(), {});
+  const std::vector<std::string> lines = describeImage(folder.file("deep.exr"));
+  const std::vector<std::string> expected{"deep image 3 x 2, 6 channels, OpenEXR",
+                                          "samples: 3, 0.5 per pixel, 2 at most; 4 pixels have none",
+                                          "channel A: half, 0.25 to 1",
+                                          "channel B: half, 0 to 0",
+                                          "channel G: half, 0 to 0",
+                                          "channel R: half, 0 to 0.5",
+                                          "channel Z: float, 1.5 to 4",
+                                          "channel ZBack: float, 2 to 7"};
+  ASSERT_GT(lines.size(), expected.size());
+  EXPECT_EQ(std::vector(lines.begin(), lines.begin() + std::ptrdiff_t(expected.size())), expected);
+}
+
 TEST(Holdout, LetsThroughTheProductOfItsSamples) {
   DeepImage image;
   image.width = image.height = 1;
