@@ -11,6 +11,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 namespace {
@@ -77,15 +78,15 @@ const Mesh& requireValid(const Mesh& mesh) {
     const bool ofVertices = a.domain == MeshAttribute::Domain::vertex;
     const std::size_t count = ofVertices ? positionCount : cornerCount;
     if (a.width < 0 || a.values.size() != count * static_cast<std::size_t>(a.width))
-      throw Error("mesh: attribute '" + a.name + "' has " + number(a.values.size()) + " values for " +
-                  number(count) + (ofVertices ? " positions" : " corners") + ", " + number(a.width) +
-                  " each");
+      throw Error("mesh: attribute '" + printable(a.name, 60) + "' has " + number(a.values.size()) +
+                  " values for " + number(count) + (ofVertices ? " positions" : " corners") + ", " +
+                  number(a.width) + " each");
   }
   for (const MeshGroup& group : mesh.groups) {
     const std::size_t end = std::size_t{group.firstFace} + group.faceCount;
     if (end > mesh.faceCount())
-      throw Error("mesh: group '" + group.name + "' ends behind face " + number(end) + ", but there are " +
-                  number(mesh.faceCount()) + " faces");
+      throw Error("mesh: group '" + printable(group.name, 60) + "' ends behind face " + number(end) +
+                  ", but there are " + number(mesh.faceCount()) + " faces");
   }
   return mesh;
 }

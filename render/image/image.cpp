@@ -33,7 +33,7 @@ const Image::Channel* Image::find(const std::string& name) const {
 
 const Image::Channel& Image::channel(const std::string& name) const {
   const Channel* channel = find(name);
-  require(channel != nullptr, "image: has no channel called " + name);
+  require(channel != nullptr, "image: has no channel called " + printable(name, 60));
   return *channel;
 }
 
@@ -49,8 +49,8 @@ void Image::check() const {
     require(names.insert(channel.name).second,
             fmt::format("image: two channels are called '{}'", printable(channel.name, 60)));
     require(channel.values.size() == std::size_t(width) * std::size_t(height),
-            fmt::format("image: the channel {} has {} values, but the size is {}x{}", channel.name,
-                        channel.values.size(), width, height));
+            fmt::format("image: the channel {} has {} values, but the size is {}x{}",
+                        printable(channel.name, 60), channel.values.size(), width, height));
   }
 }
 

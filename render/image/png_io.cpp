@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -15,6 +16,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/render/image/image_file.h"
 
 namespace nephele {
@@ -81,6 +83,25 @@ std::array<TransferCurve, 3> curvesOf(png_structp png, png_infop info) {
   return curves;
 }
 
+/// The chunk that holds `text` as it is: plain ones are in Latin-1, which agrees with UTF-8 for ASCII alone.
+int textKind(std::string_view text) {
+  const bool isAscii = std::all_of(text.begin(), text.end(), [](char c) { return (c & 0x80) == 0; });
+  return !isAscii && isUtf8(text) ? PNG_ITXT_COMPRESSION_NONE : PNG_TEXT_COMPRESSION_NONE;
+}
+
+/// A text of a file in UTF-8. Plain ones are Latin-1, but many programs write UTF-8 there.
+std::string utf8Of(const png_text& text) {
+  const std::string value = text.text ? text.text : "";
+  if (text.compression >= PNG_ITXT_COMPRESSION_NONE || isUtf8(value)) return value;
+  std::string result;
+  for (const char c : value) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code >= 0x80) result += static_cast<char>(0xc0 | code >> 6);
+    result += static_cast<char>(code < 0x80 ? code : 0x80 | (code & 0x3f));
+  }
+  return result;
+}
+
 struct Writer : Handle {
   Writer() : Handle(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, failToWrite, ignore)) {}
   ~Writer() { png_destroy_write_struct(&png, &info); }
@@ -109,7 +130,7 @@ void writePng(const std::string& path, const Image& image, const ViewTransform& 
     for (const auto& [name, value] : metadata) {
       // libpng takes its texts by pointers that are not const, and copies them.
       png_text text{};
-      text.compression = PNG_TEXT_COMPRESSION_NONE;
+      text.compression = textKind(value);
       text.key = const_cast<char*>(name.c_str());
       text.text = const_cast<char*>(value.c_str());
       png_set_text(writer.png, writer.info, &text, 1);
@@ -158,8 +179,7 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
       header.channels.push_back({names[count - 1][c], depth == 16 ? "uint16" : "uint8"});
     png_textp texts = nullptr;
     const int textCount = png_get_text(png.png, png.info, &texts, nullptr);
-    for (int i = 0; i < textCount; ++i)
-      header.attributes.emplace_back(texts[i].key, texts[i].text ? texts[i].text : "");
+    for (int i = 0; i < textCount; ++i) header.attributes.emplace_back(texts[i].key, utf8Of(texts[i]));
     header.curves = curvesOf(png.png, png.info);
     reader.begin(header);
 

@@ -41,6 +41,10 @@ TEST(Mesh, ValidityIsRequiredOfFacesCornersAttributesAndGroups) {
             }),
             "mesh: attribute 'uv' has 0 values for 24 corners, 2 each");
   EXPECT_EQ(messageFor([](Mesh& m) {
+              m.attributes = {{"u\nv", MeshAttribute::Domain::corner, 2, {}}};
+            }),
+            "mesh: attribute 'u\\nv' has 0 values for 24 corners, 2 each");
+  EXPECT_EQ(messageFor([](Mesh& m) {
               m.groups = {{"all", 4, 3}};
             }),
             "mesh: group 'all' ends behind face 7, but there are 6 faces");

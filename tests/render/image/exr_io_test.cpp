@@ -101,6 +101,18 @@ TEST(ExrIo, RefusesAChannelThatHasNotAValueForEveryPixel) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
+TEST(ExrIo, SaysInOneLineWhichChannelIsOfAnotherSize) {
+  Image image = someImage();
+  image.channels[0].name = "two\nlines";
+  image.channels[0].values.pop_back();
+  try {
+    image.check();
+    ADD_FAILURE() << "a channel without its last pixel was taken";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "image: the channel two\\nlines has 34 values, but the size is 7x5");
+  }
+}
+
 TEST(ExrIo, NamesTheFileOfAPictureWithoutChannels) {
   const test::TemporaryFolder folder;
   Image image = someImage();
@@ -155,6 +167,22 @@ TEST(PngIo, WritesWhatTheScreenShows) {
       // A step of 8 bits, and the dither's half.
       EXPECT_NEAR(back.channels[c].values[i], screen[i * 3 + c], 1.01 / 255);
   EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+// A plain text chunk (tEXt) is in Latin-1, an international one (iTXt) in UTF-8: PNG specification, 11.3.4.
+TEST(PngIo, TextsBeyondAsciiAreInUtf8) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.png"), title = "Wölkchen 雲 ☁", bytes = "caf\xe9";
+  writePng(path, someImage(), {}, {{"seed", "7"}, {"title", title}, {"bytes", bytes}});
+  const std::string file = test::textOf(path);
+  EXPECT_NE(file.find("tEXtseed"), std::string::npos);
+  // Keyword, not compressed, no language, no translated keyword.
+  EXPECT_NE(file.find("iTXttitle" + std::string(5, '\0') + title), std::string::npos);
+  EXPECT_NE(file.find("tEXtbytes" + std::string(1, '\0') + bytes), std::string::npos) << "no UTF-8";
+  const std::vector<std::string> lines = describeImage(path);
+  for (const std::string line : {"seed: 7", "bytes: café"})
+    EXPECT_NE(std::find(lines.begin(), lines.end(), line), lines.end()) << line;
+  EXPECT_NE(std::find(lines.begin(), lines.end(), "title: " + title), lines.end());
 }
 
 TEST(ExrIo, KeepsWhereAPartOfAPictureBelongs) {
