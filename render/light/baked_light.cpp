@@ -51,6 +51,8 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
+  // Samples that are to be given back are, before the light takes its memory.
+  if (readsCodes()) volume.coded();
   const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
   std::optional<RenderVolume> finer;
   if (lights.shadowDetail > 1 && (!distant.empty() || !lights.locals.empty()))
@@ -80,6 +82,15 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   scatter(before, progress);
   for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
   code();
+}
+
+// Whether all light can be made of a density that is coded.
+bool BakedLight::readsCodes() const {
+  const bool hasDeep = lights.deepTolerance || std::ranges::any_of(lights.suns, [](const DistantLight& sun) {
+                         return bool(sun.deepShadow);
+                       });
+  return lights.locals.empty() && !hasDeep && lights.shadowDetail <= 1 && !source->hasEmission() &&
+         ScatteredLight::readsCodes(*source, solverOptions());
 }
 
 // Last, when the floats have been read and what the light needed while it was made is given back.

@@ -69,6 +69,7 @@ struct BakedLight {
                     const Progress& progress) const;
   void takeLights();
   void addLocal(const LocalLight& light, const ProjectedLightVolume& shadows);
+  bool readsCodes() const;
   void code();
   void setColours(const RenderVolume& volume, float most);
   void scatter(const BakedLight* before, const Progress& progress);

@@ -94,6 +94,8 @@ struct LightVolume::Patch {
 /// The density seen along one index axis: (u, v) across, w along.
 struct LightVolume::Sweep {
   const BrickGrid& grid;
+  /// Null where the grid has its samples.
+  const CodedBricks* coded;
   int u, v, w;
   float slopeU, slopeV;
   /// World length of a slice along the light, and whether the light is at the upper end of w.
@@ -101,7 +103,8 @@ struct LightVolume::Sweep {
   bool fromAbove;
   int sampleStride[3];
 
-  Sweep(const BrickGrid& density, const Vec3f& light) : grid(density) {
+  Sweep(const RenderVolume& volume, const Vec3f& light)
+      : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()) {
     w = 0;
     for (int axis = 1; axis != 3; ++axis)
       if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
@@ -111,9 +114,10 @@ struct LightVolume::Sweep {
     slopeV = light[v] / light[w];
     step = 1.0f / std::fabs(light[w]);
     fromAbove = light[w] > 0;
+    const int width = coded ? CodedBricks::kWidth : BrickGrid::kWidth;
     sampleStride[0] = 1;
-    sampleStride[1] = BrickGrid::kWidth;
-    sampleStride[2] = BrickGrid::kWidth * BrickGrid::kWidth;
+    sampleStride[1] = width;
+    sampleStride[2] = width * width;
   }
 
   Vec3i bricks(int bu, int bv, int bw) const {
@@ -152,24 +156,38 @@ struct LightVolume::Sweep {
         const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
         const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
-        const float* from = grid.brick(pool) + (insideBrick(k) + 1) * sampleStride[w] +
-                            (insideBrick(u1) + 1) * sampleStride[u];
-        const int count = u2 - u1;
-        for (int y = v1; y != v2; ++y) {
-          const float* source = from + (insideBrick(y) + 1) * sampleStride[v];
-          float* row = patch.samples.data() + (y - patch.v) * kPitch + (u1 - patch.u);
-          if (!holds)
-            std::fill_n(row, count, 0.0f);
-          else if (count == size && sampleStride[u] == 1)
-            std::copy_n(source, size, row);
-          else
-            for (int x = 0; x != count; ++x) row[x] = source[x * sampleStride[u]];
+        float* rows = patch.samples.data() + (v1 - patch.v) * kPitch + (u1 - patch.u);
+        const int countU = u2 - u1, countV = v2 - v1;
+        const int first = insideBrick(k) * sampleStride[w] + insideBrick(u1) * sampleStride[u] +
+                          insideBrick(v1) * sampleStride[v];
+        if (!holds) {
+          copyRows(countU, countV, rows, [](int, int) { return 0.0f; });
+        } else if (coded) {
+          const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
+          const std::uint16_t* from = coded->codes() + entry.first + first;
+          copyRows(countU, countV, rows, [&](int x, int y) {
+            return (float(from[x * sampleStride[u] + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
+          });
+        } else {
+          const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
+          copyRows(countU, countV, rows,
+                   [&](int x, int y) { return from[x * sampleStride[u] + y * sampleStride[v]]; });
         }
         u1 = u2;
       }
       v1 = v2;
     }
     return true;
+  }
+
+  // The samples at(x, y) of a part of a patch, whose rows are mostly whole bricks.
+  template <class At>
+  static void copyRows(int countU, int countV, float* rows, const At& at) {
+    for (int y = 0; y != countV; ++y, rows += kPitch)
+      if (countU == BrickGrid::kBrick)
+        for (int x = 0; x != BrickGrid::kBrick; ++x) rows[x] = at(x, y);
+      else
+        for (int x = 0; x != countU; ++x) rows[x] = at(x, y);
   }
 
   // What any node of a brick of the lattice adds to its column at least, its first nodes at (u0, v0).
@@ -223,7 +241,7 @@ LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const
   require(isFinite(towards) && length(towards) > 0,
           "light: the direction towards it must be finite and not zero");
   const BrickGrid& grid = volume.density();
-  const Sweep sweep(grid, grid.worldToIndex().linear * normalize(towards));
+  const Sweep sweep(volume, grid.worldToIndex().linear * normalize(towards));
   Mat3f shear;
   shear(0, sweep.u) = shear(1, sweep.v) = shear(2, sweep.w) = 1;
   shear(0, sweep.w) = -sweep.slopeU;

@@ -202,6 +202,10 @@ float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options&
           volume.typicalDensity());
 }
 
+bool ScatteredLight::readsCodes(const RenderVolume& volume, const Options& options) {
+  return !volume.isEmpty() && detail::readsOwnNodes(detail::LatticePlacement(volume, options.longestSide));
+}
+
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
   const Vec3i size = detail::LatticePlacement(volume, options.longestSide).lattice().size;

@@ -64,6 +64,13 @@ class CodedBricks {
     return (float(codes_.get()[entry.first + inside]) - kZero) * entry.unit;
   }
 
+  /// All kNodes of it.
+  void decode(std::size_t place, float* nodes) const {
+    const Entry entry = entries_[place];
+    const std::uint16_t* codes = codes_.get() + entry.first;
+    for (int n = 0; n != kNodes; ++n) nodes[n] = (float(codes[n]) - kZero) * entry.unit;
+  }
+
   /// Copies share their codes.
   std::size_t memoryBytes() const {
     return units_.size() * (kNodes * sizeof(std::uint16_t) + sizeof(float)) +

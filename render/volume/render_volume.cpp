@@ -219,6 +219,11 @@ float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
 }
 
 float RenderVolume::typicalDensity() const {
+  std::call_once(made_->measuring, [this] { made_->typicalDensity = measuredTypicalDensity(); });
+  return made_->typicalDensity;
+}
+
+float RenderVolume::measuredTypicalDensity() const {
   struct Sums {
     double density = 0, squares = 0;
   };
@@ -253,18 +258,22 @@ float RenderVolume::typicalDensity() const {
 }
 
 const CodedBricks& RenderVolume::coded() const {
-  std::call_once(coded_->once, [this] {
-    if (coded_->isInPlace && density_.use_count() == 1)
+  std::call_once(made_->coding, [this] {
+    made_->isGivenUp = made_->isToGiveUp && density_.use_count() == 1;
+    if (made_->isGivenUp) {
+      // It can only be told from the samples.
+      typicalDensity();
       // Grids are made to be written; only what is shared is not.
-      coded_->bricks = CodedBricks::inPlaceOf(const_cast<BrickGrid&>(*density_));
-    else
-      coded_->bricks = CodedBricks(*density_);
+      made_->coded = CodedBricks::inPlaceOf(const_cast<BrickGrid&>(*density_));
+    } else {
+      made_->coded = CodedBricks(*density_);
+    }
   });
-  return coded_->bricks;
+  return made_->coded;
 }
 
 void RenderVolume::giveUpSamples() {
-  coded_->isInPlace = true;
+  made_->isToGiveUp = true;
 }
 
 std::size_t RenderVolume::memoryBytes() const {

@@ -52,6 +52,8 @@ class RenderVolume {
   /// marched: they read as 0 then. Layers of normals, the path tracer and light made anew need them. The grid
   /// must be this volume's alone, which else keeps it.
   void giveUpSamples();
+  /// False once they are given back: then only `coded` holds the density.
+  bool hasSamples() const { return !made_->isGivenUp; }
   /// Null where the grid is all there is.
   const FieldDensity* field() const { return field_.get(); }
   const VolumeColour& colour() const { return colour_; }
@@ -65,7 +67,7 @@ class RenderVolume {
   bool isEmpty() const { return occupied_.empty(); }
   float maxDensity() const { return maxDensity_; }
   /// Mean density weighted by itself: what light meets where it meets anything. 0 for an empty volume.
-  /// Cost: one pass over the samples.
+  /// Cost: one pass over the samples, at the first call.
   float typicalDensity() const;
 
   /// Brick coordinates of the bricks that hold density or emission, in the table's order.
@@ -89,14 +91,17 @@ class RenderVolume {
   std::size_t memoryBytes() const;
 
  private:
-  struct Coded {
-    std::once_flag once;
-    CodedBricks bricks;
-    bool isInPlace = false;
+  /// What is made where it is asked for.
+  struct Made {
+    std::once_flag coding, measuring;
+    CodedBricks coded;
+    float typicalDensity = 0;
+    bool isToGiveUp = false, isGivenUp = false;
   };
 
   void checkColour(const VolumeColour::Grids& grids, const char* name) const;
   void measureColour();
+  float measuredTypicalDensity() const;
   bool isOccupied(std::size_t entry) const;
   void findOccupied();
   void measureEmptiness();
@@ -105,7 +110,7 @@ class RenderVolume {
 
   std::shared_ptr<const BrickGrid> density_;
   VolumeColour colour_;
-  std::shared_ptr<Coded> coded_ = std::make_shared<Coded>();
+  std::shared_ptr<Made> made_ = std::make_shared<Made>();
   std::shared_ptr<const FieldDensity> field_;
   Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;

@@ -59,19 +59,26 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
     share[n] = at[n] - float(low[n]);
   }
   parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
-    float density[SampleRow::kMost];
+    float density[SampleRow::kMost], nodes[CodedBricks::kNodes];
     for (std::size_t i = begin; i != end; ++i) {
       const Vec3i origin = (occupied[i] - place.firstBrick) * perBrick;
       const std::int32_t pool = grid.poolIndex(occupied[i]);
-      const float* values = grid.brick(pool);
       const Interval& range = grid.ranges()[std::size_t(pool)];
+      const float* values = grid.brick(pool) + sampleOffset(0, 0, 0);
+      int width = BrickGrid::kWidth;
+      if (!volume.hasSamples() && !range.isPoint()) {
+        volume.coded().decode(grid.tableIndex(occupied[i]), nodes);
+        values = nodes;
+        width = CodedBricks::kWidth;
+      }
       std::fill_n(density, across, range.max);
       for (int z = 0; z != across; ++z)
         for (int y = 0; y != across; ++y) {
           float most = range.max;
           if (!range.isPoint()) {
             const float* rows[4];
-            for (int n = 0; n != 4; ++n) rows[n] = values + sampleOffset(0, low[y] + n % 2, low[z] + n / 2);
+            for (int n = 0; n != 4; ++n)
+              rows[n] = values + ((low[z] + n / 2) * width + low[y] + n % 2) * width;
             most = 0;
             for (int x = 0; x != across; ++x) {
               const auto along = [&](const float* row) {
@@ -101,6 +108,10 @@ float samplesPerCell(const LatticePlacement& place) {
 }
 
 }  // namespace
+
+bool readsOwnNodes(const LatticePlacement& place) {
+  return 0.5f * spacingOf(place.factor) >= 0.5f;
+}
 
 LatticePlacement::LatticePlacement(const RenderVolume& volume, int longestSide) {
   const Box box = volume.indexBounds();

@@ -16,6 +16,9 @@ struct LatticePlacement {
   ScatteringLattice lattice() const;
 };
 
+/// Whether no sample lies before the first node of its brick, so that coded bricks do as well.
+bool readsOwnNodes(const LatticePlacement& place);
+
 /// Sets the lattice's densities: means of what the march reads between the voxels.
 void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice);
 

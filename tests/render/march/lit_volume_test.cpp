@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/march/raymarch.h"
@@ -61,6 +62,34 @@ TEST(LitVolume, AnEmptyVolumeMakesPicturesOfZeros) {
       LitVolume(volume, {}, kLights, options.octaves).render(cameraAt(volume, 0), options).image;
   for (const char* name : {"R", "G", "B", "A"})
     for (const float value : image.channel(name).values) EXPECT_EQ(value, 0.0f);
+}
+
+TEST(LitVolume, LooksTheSameWhoseSamplesAreGivenBack) {
+  // So long that light reads codes; and so short that it needs the samples first. Codes are half of 1 / 57343
+  // of a brick's largest value off, in every sum of many the less.
+  for (const int longest : {160, 40}) {
+    const auto grid = test::densityGrid(
+        test::voxels(0.1f), {-longest, -10, -10}, {longest, 10, 10},
+        [](const Vec3f& p) { return std::fmax(0.0f, 1 + std::sin(3 * p.x) - p.y * p.y - p.z * p.z); });
+    const RenderVolume kept(grid);
+    RenderVolume given(std::make_shared<BrickGrid>(*grid));
+    given.giveUpSamples();
+    const Medium medium{6.0f};
+    for (const Vec3f& towards :
+         {Vec3f{0.2f, 0.9f, 0.4f}, Vec3f{0.9f, 0.2f, -0.3f}, Vec3f{0.1f, -0.4f, 0.8f}}) {
+      const Lights lights{{{"sun", towards, {3, 3, 3}}}, {0.1f, 0.2f, 0.3f}};
+      const Image all = renderImage(kept, medium, lights, cameraAt(kept, 20), {}).image,
+                  same = renderImage(given, medium, lights, cameraAt(given, 20), {}).image;
+      EXPECT_FALSE(given.hasSamples());
+      for (const char* name : {"R", "G", "B", "A"}) {
+        const std::vector<float>&a = all.channel(name).values, &b = same.channel(name).values;
+        for (std::size_t i = 0; i != a.size(); ++i)
+          ASSERT_NEAR(a[i], b[i], 1e-4f * (a[i] + 0.01f)) << name << " " << i;
+      }
+      given = RenderVolume(std::make_shared<BrickGrid>(*grid));
+      given.giveUpSamples();
+    }
+  }
 }
 
 TEST(LitVolume, RefusesOctavesOtherThanItsOwn) {
