@@ -100,8 +100,10 @@ def scenes(options):
         found += [Scene(f"{name}_{sun}", name, sun, options.fog, medium(extinction, 1, "hg:0.877", DISNEY_AZIMUTHS[sun] + ",2.6,2.5,2.3",
                                                                         "0.03,0.07,0.23"), DISNEY_VIEW, 16) for sun in SUNS]
     usual = "0.1,0.17,0.28"
-    for name, values in (("cumulus", (None, 0.99, "hg:0.3")), ("wisps", (None, 0.999, "hg:0.85")), ("droplets", (160, 0.9999, "mie:12"))):
-        found += [Scene(f"{name}_{sun}", name, sun, volumes[name], medium(*values, AZIMUTHS[sun] + ",3.6", usual), parts=16) for sun in SUNS]
+    ours = {"cumulus": (None, 0.99, "hg:0.3"), "wisps": (None, 0.999, "hg:0.85"), "droplets": (160, 0.9999, "mie:12")}
+    for name, values in ours.items():
+        found += [Scene(f"{name}_{sun}", name, sun, volumes[name], medium(*values, AZIMUTHS[sun] + ",3.6", usual), parts=16)
+                  for sun in SUNS]
     return [scene for scene in found if scene.group in options.what]
 
 
@@ -121,7 +123,7 @@ def render(options, scene, name, extra, runs=1):
     """Makes FOLDER/NAME.exr, and FOLDER/NAME.json with the least seconds of `runs`."""
     picture, times = inside(options, name + ".exr"), []
     # Under another name until it is whole, so that what was stopped is made again.
-    unfinished = inside(options, "unfinished.exr")
+    unfinished = inside(options, f"unfinished_{os.getpid()}.exr")
     for _ in range(runs):
         times.append(timed(scene.command(options, unfinished) + extra)[0])
     os.replace(unfinished, picture)
@@ -169,9 +171,10 @@ def cycles(options, scene):
         if os.path.exists(inside(options, name + ".json")):
             continue
         save(inside(options, "cycles/scene.json"), {
-            "volume": scene.volume, "voxel": voxel, "size": SIZE, "camera": eye, "target": [e + math.hypot(*eye) * f for e, f in zip(eye, forward)],
-            "up": up, "fov": fov, "towards_sun": [math.cos(elevation) * math.sin(azimuth), math.sin(elevation),
-                                                   math.cos(elevation) * math.cos(azimuth)],
+            "volume": scene.volume, "voxel": voxel, "size": SIZE, "camera": eye, "up": up,
+            "target": [e + math.hypot(*eye) * f for e, f in zip(eye, forward)],
+            "fov": fov, "towards_sun": [math.cos(elevation) * math.sin(azimuth), math.sin(elevation),
+                                        math.cos(elevation) * math.cos(azimuth)],
             "irradiance": sun if len(sun) == 3 else sun[0], "sky": [float(x) for x in wanted["--sky"].split(",")],
             "extinction": extinction, "albedo": float(wanted["--albedo"].split(",")[0]),
             "g": float(wanted["--phase"][3:]), "samples": samples, "bounces": 1024, "step_rate": 1, "filter_width": 3.1, "seed": samples,

@@ -24,15 +24,14 @@ class Row:
 
 def parts_of(options, scene):
     """[(picture, samples)], and the processor seconds of each."""
-    parts, seconds = [], []
-    while os.path.exists(path := inside(options, f"parts/{scene.name}_{len(parts)}.exr")):
-        told = path[:-3] + "json"
-        told = load(told) if os.path.exists(told) else {}
-        parts.append((Picture.read(path), told.get("samples", PART)))
-        seconds.append(told.get("processor", math.nan))
-    if not parts:
+    paths = []
+    while os.path.exists(path := inside(options, f"parts/{scene.name}_{len(paths)}.exr")):
+        paths.append(path)
+    if not paths:
         sys.exit(f"no reference of {scene.name}: --do trace makes it")
-    return parts, seconds
+    told = [load(path[:-3] + "json") if os.path.exists(path[:-3] + "json") else {} for path in paths]
+    pictures = Picture.read(*paths) if len(paths) > 1 else [Picture.read(paths[0])]
+    return list(zip(pictures, (t.get("samples", PART) for t in told))), [t.get("processor", math.nan) for t in told]
 
 
 def rows_of(options, scene):
@@ -63,8 +62,13 @@ def percent(value):
     return f"{100 * value:+.1f}"
 
 
+def size(rms):
+    """What is left of the square of an error may be negative where the noise of the reference is larger."""
+    return f"{100 * rms:.1f}" if rms > 0 else "< noise"
+
+
 def cells(errors):
-    return f"{percent(errors['mean'])} / {100 * errors['rms']:.1f} / {percent(errors['worst'])} | {errors['relmse']:.2g}"
+    return f"{percent(errors['mean'])} / {size(errors['rms'])} / {percent(errors['worst'])} | {errors['relmse']:.2g}"
 
 
 def cloud_table(by_sun):
@@ -85,8 +89,8 @@ def angle_table(options, found):
     for scene in found:
         reference = Reference(parts_of(options, scene)[0])
         e = reference.errors(Picture.read(inside(options, f"march/{scene.name}_good.exr")))
-        lines.append(f"| {scene.name.split('_')[1]} | {scene.sun} | {percent(e['mean'])} % | {100 * e['rms']:.1f} % | "
-                     f"{percent(e['worst'])} % | {100 * reference.noise(reference.covered):.1f} % | {100 * e['bright_rms']:.1f} % | "
+        lines.append(f"| {scene.name.split('_')[1]} | {scene.sun} | {percent(e['mean'])} % | {size(e['rms'])} % | "
+                     f"{percent(e['worst'])} % | {100 * reference.noise(reference.covered):.1f} % | {size(e['bright_rms'])} % | "
                      f"{percent(e['bright_worst'])} % | {100 * reference.noise(reference.bright):.1f} % |")
     return lines
 
@@ -137,8 +141,8 @@ def sheet(options, group, suns, out):
         for source in [mean, marched] + [theirs] * is_there:
             parts.append(inside(options, f"sheet/{len(parts)}.exr"))
             subprocess.run(["oiiotool", source, "--ch", "R,G,B,A", "--pattern", f"constant:color={sky},1", f"{width}x{height}", "4",
-                            "--over", "--ch", "R,G,B", "--mulc", repr(EXPOSURE[group]), "--colorconvert", "linear", "sRGB", "--clamp:min=0:max=1",
-                            "--resize:filter=box", f"{2 * width}x{2 * height}", "-o", parts[-1]], check=True)
+                            "--over", "--ch", "R,G,B", "--mulc", repr(EXPOSURE[group]), "--colorconvert", "linear", "sRGB",
+                            "--clamp:min=0:max=1", "--resize:filter=box", f"{2 * width}x{2 * height}", "-o", parts[-1]], check=True)
         errors, colours = Picture.read(marched), []
         for y in range(height):
             for x in range(width):
