@@ -255,7 +255,7 @@ void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
 }
 
 ScatteredLight::Options BakedLight::solverOptions() const {
-  return {.order = octaves.order};
+  return {.longestSide = octaves.longestSide(), .order = octaves.order};
 }
 
 // The first colour in which light is scattered as in this one.

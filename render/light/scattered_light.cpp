@@ -27,6 +27,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/beam_samples.h"
+#include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
 #include "nephele/render/light/detail/lattice_point.h"
 #include "nephele/render/light/detail/scattering_lattice.h"
@@ -38,8 +39,6 @@ namespace {
 
 // Typical optical depth of a cell, beyond which it is thinned.
 constexpr float kDeepestCell = 2.0f;
-// Nodes are asked for a cell and a quarter away from density.
-constexpr int kReach = 2;
 // Moments below this are not worth a degree.
 constexpr float kSmallMoment = 0.1f;
 
@@ -105,9 +104,10 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
     for (std::size_t m = 0; m != sky_.size(); ++m)
       sky_[m] += medium.ordinates[i].weight * medium.inflow[i] * y[m];
   }
-  moments_ = sky_;
-  beam_ = density_ = {0.0f};
-  near_ = {1};
+  size_ = {detail::CellRows::kVector, 1, 1};
+  rows_ = std::make_shared<const detail::CellRows>(size_, std::vector<std::uint8_t>(std::size_t(size_.x), 1));
+  for (const float moment : sky_) moments_.insert(moments_.end(), std::size_t(size_.x), moment);
+  beam_ = density_ = std::vector<float>(std::size_t(size_.x));
   if (volume.isEmpty()) return;
 
   const SmoothScattering smooth(scattering.phase, scattering.albedo, degree);
@@ -116,39 +116,39 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   const detail::LatticePlacement place(volume, options.longestSide);
   detail::ScatteringLattice lattice = place.lattice();
   detail::sampleDensity(volume, place, lattice);
-  const float perDensity = scattering.extinction * smooth.share * grid.voxelSize() * float(place.factor),
+  const float perDensity = scattering.extinction * smooth.share * grid.voxelSize() * place.voxelsPerCell(),
               deepest = perDensity * detail::typicalDensity(lattice);
   smoothShare_ = smooth.share;
   share_ = smooth.share * (deepest > kDeepestCell ? kDeepestCell / deepest : 1.0f);
   detail::sampleBeam(volume, place, source, scattering.extinction * share_, lattice);
   if (source.glow)
     for (float& value : lattice.beam) value /= share_ * std::max(albedo_, 1e-6f);
-  while (lattice.longest() >= options.longestSide + detail::ScatteringLattice::kRow)
-    lattice = detail::halved(lattice);
+  while (2 * lattice.longest() > 3 * options.longestSide) lattice = detail::halved(lattice);
 
   size_ = lattice.size;
-  const float scale = 1.0f / float(lattice.factor);
+  const float scale = 1 / lattice.voxels;
   const Vec3f middle =
-      Vec3f(place.firstBrick * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * float(lattice.factor - 1));
+      Vec3f(place.firstBrick * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * (lattice.voxels - 1));
   worldToLattice_ = {Mat3f::scaling(scale) * grid.worldToIndex().linear,
                      (grid.worldToIndex().translation - middle) * scale};
-  depthPerDensity_ = scattering.extinction * share_ * grid.voxelSize() * float(lattice.factor);
+  depthPerDensity_ = scattering.extinction * share_ * grid.voxelSize() * lattice.voxels;
   if (source.towards) towards_ = normalize(worldToLattice_.linear * *source.towards);
   if (source.place) place_ = worldToLattice_(*source.place);
 
   medium.extinction = depthPerDensity_;
   medium.phase = phase_;
   for (float& value : medium.phase) value *= albedo_;
+  const float finest = lattice.voxels;
   detail::TransportSolver solver(std::move(lattice), std::move(medium));
   moments_ = solver.solve(
       sky_,
-      [&](const detail::ScatteringLattice& level, float wider, std::vector<float>& light) {
-        addBeam(light, level.size, level.beam, wider);
+      [&](const detail::ScatteringLattice& level, const detail::CellRows& rows, std::vector<float>& light) {
+        addBeam(light, level, rows, level.voxels / finest);
       },
       {options.sweeps, options.tolerance}, progress);
   sweeps_ = solver.sweeps();
   residual_ = solver.residual();
-  near_ = detail::surroundings(solver.finest(), kReach);
+  rows_ = std::make_shared<const detail::CellRows>(std::move(solver.finestRows()));
   beam_ = std::move(solver.finest().beam);
   density_ = std::move(solver.finest().density);
 }
@@ -161,31 +161,31 @@ Vec3f ScatteredLight::wayOfBeam(const Vec3f& node) const {
 }
 
 // Adds the moments of the beam to those of a lattice whose cells are so many times wider.
-void ScatteredLight::addBeam(std::vector<float>& moments, const Vec3i& size, const std::vector<float>& beam,
-                             float wider) const {
-  const std::size_t cells = beam.size(), count = hasWay() ? moments.size() / cells : 1;
+void ScatteredLight::addBeam(std::vector<float>& moments, const detail::ScatteringLattice& lattice,
+                             const detail::CellRows& rows, float wider) const {
+  const std::size_t count = hasWay() ? moments.size() / rows.count() : 1;
   const int degree = int(phase_.size()) - 1;
-  const std::size_t nx = std::size_t(size.x), ny = std::size_t(size.y);
-  parallelFor(std::size_t(size.z), 1, [&](std::size_t begin, std::size_t end) {
+  rows.forEachRow([&](int y, int z, const detail::CellRows::Row& row) {
     float own[detail::kMostMoments] = {1.0f};
     if (towards_) detail::harmonics(-*towards_, degree, own);
-    for (std::size_t i = begin * nx * ny; i != end * nx * ny; ++i) {
-      if (beam[i] == 0) continue;
+    for (int x = row.begin; x != row.end; ++x) {
+      const float beam = lattice.beam[lattice.index(x, y, z)];
+      if (beam == 0) continue;
       if (place_) {
         const float half = 0.5f * (wider - 1);
-        const Vec3f node{float(i % nx), float(i / nx % ny), float(i / nx / ny)};
-        detail::harmonics(wayOfBeam(node * wider + Vec3f{half, half, half}), degree, own);
+        detail::harmonics(wayOfBeam(Vec3f(Vec3i{x, y, z}) * wider + Vec3f{half, half, half}), degree, own);
       }
-      for (std::size_t m = 0; m != count; ++m) moments[m * cells + i] += own[m] * beam[i];
+      const std::size_t at =
+          detail::CellRows::momentsAt(std::size_t(row.first + x), moments.size() / rows.count());
+      for (std::size_t m = 0; m != count; ++m) moments[at + m * detail::CellRows::kVector] += own[m] * beam;
     }
   });
 }
 
 std::vector<float> ScatteredLight::mean() const {
-  const std::size_t cells = beam_.size();
-  std::vector<float> result(moments_.begin(), moments_.begin() + std::ptrdiff_t(cells));
-  parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) result[i] -= beam_[i];
+  std::vector<float> result(beam_.size());
+  rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f&) {
+    result[i] = moments_[detail::CellRows::momentsAt(kept, sky_.size())] - beam_[i];
   });
   return result;
 }
@@ -198,8 +198,8 @@ float ScatteredLight::meanAt(const Vec3f& world) const {
 float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return 0;
   return kDeepestCell /
-         (volume.density().voxelSize() * float(detail::LatticePlacement(volume, options.longestSide).factor) *
-          volume.typicalDensity());
+         (volume.density().voxelSize() *
+          detail::LatticePlacement(volume, options.longestSide).voxelsPerCell() * volume.typicalDensity());
 }
 
 bool ScatteredLight::readsCodes(const RenderVolume& volume, const Options& options) {
@@ -208,14 +208,18 @@ bool ScatteredLight::readsCodes(const RenderVolume& volume, const Options& optio
 
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
-  const Vec3i size = detail::LatticePlacement(volume, options.longestSide).lattice().size;
-  const double nodes = double(size.x) * size.y * size.z,
-               moments = detail::momentCount(options.order == 4   ? 2
+  const detail::LatticePlacement place(volume, options.longestSide);
+  const double moments = detail::momentCount(options.order == 4   ? 2
                                              : options.order == 6 ? 3
                                                                   : detail::kMostDegree);
-  // Moments: the light, swept and turned, and the acceleration's; beside them what the sweeps know of every
-  // cell.
-  return {(9 * moments + 40) * sizeof(float) * nodes, (moments + 3) * sizeof(float) * nodes};
+  double nodes = place.cells(), near = place.cellsNear(volume, detail::TransportSolver::kReach);
+  const double sampled = nodes;
+  for (int longest = place.longest(); 2 * longest > 3 * options.longestSide; longest /= 2)
+    nodes /= 8, near /= 8;
+  // Moments: the light, swept and turned, what is added up there, and the acceleration's, on all lattices;
+  // beside them what the sweeps know of every cell.
+  return {(7 * moments + 14) * sizeof(float) * near + 3 * sizeof(float) * sampled,
+          moments * sizeof(float) * near + 3 * sizeof(float) * nodes};
 }
 
 }  // namespace nephele

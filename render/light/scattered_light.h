@@ -1,7 +1,7 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,6 +12,11 @@
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele {
+
+namespace detail {
+class CellRows;
+struct ScatteringLattice;
+}  // namespace detail
 
 /// How a volume scatters light of one colour.
 struct Scattering {
@@ -55,15 +60,15 @@ struct Viewpoint {
 class ScatteredLight {
  public:
   struct Options {
-    /// Nodes along the longest side, at most.
-    int longestSide = 128;
+    /// Nodes along the longest side, about: within a third of it, where there are as many voxels.
+    int longestSide = 112;
     /// Of the directions: 4, 6 or 8, see levelSymmetric. Moments are kept up to a degree of 2, 3 or 5, where
     /// the phase function has so many.
     int order = 6;
-    /// Sweeps over the finest lattice, at most; they end where the light is within `tolerance` of what it
-    /// becomes, by what the last one changed.
+    /// Sweeps over the finest lattice, at most; they end where one changes less of all light than
+    /// `tolerance`, and leaves about as much to change.
     int sweeps = 16;
-    float tolerance = 2e-3f;
+    float tolerance = 5e-3f;
 
     /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
     /// of the directions.
@@ -111,10 +116,8 @@ class ScatteredLight {
   static Bytes estimateBytes(const RenderVolume& volume) { return estimateBytes(volume, Options{}); }
 
  private:
-  struct Nodes;
-
-  void addBeam(std::vector<float>& moments, const Vec3i& size, const std::vector<float>& beam,
-               float wider) const;
+  void addBeam(std::vector<float>& moments, const detail::ScatteringLattice& lattice,
+               const detail::CellRows& rows, float wider) const;
   Vec3f wayOfBeam(const Vec3f& node) const;
   bool hasWay() const { return towards_ || place_; }
   void sharpen(std::vector<float>& values) const;
@@ -129,9 +132,11 @@ class ScatteredLight {
   std::optional<Vec3f> towards_, place_;
   // Moments of the light around the volume.
   std::vector<float> sky_;
-  // Moments of the light at every node, beam and all; the beam alone; the density; nodes near density.
-  std::vector<float> moments_, beam_, density_;
-  std::vector<std::uint8_t> near_;
+  // Nodes near density, and the moments of the light at each of them, beam and all.
+  std::shared_ptr<const detail::CellRows> rows_;
+  std::vector<float> moments_;
+  // The beam alone and the density, at all nodes.
+  std::vector<float> beam_, density_;
   int sweeps_ = 0;
   float residual_ = 0;
 };

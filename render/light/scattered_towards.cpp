@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
 #include "nephele/render/light/detail/lattice_point.h"
 #include "nephele/render/light/exp_of_minus.h"
@@ -20,7 +21,7 @@ namespace {
 
 // Nothing behind this share of the light is looked for, and steps grow this often, after so many of them.
 constexpr float kCutoff = 1e-2f;
-constexpr int kStepsOfALength = 8, kLongestStep = 4;
+constexpr int kStepsOfALength = 4, kLongestStep = 4;
 
 // Light that goes along a line, near to far: sources are linear in depth between two places.
 struct LineOfSight {
@@ -39,25 +40,9 @@ struct LineOfSight {
 
 }  // namespace
 
-struct ScatteredLight::Nodes {
-  std::size_t nx, ny, nz;
-  const std::uint8_t* near;
-
-  // Calls body(index, node) for nodes that density is near.
-  template <class Body>
-  void forEach(const Body& body) const {
-    parallelFor(ny * nz, 16, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t row = begin; row != end; ++row)
-        for (std::size_t x = 0, i = row * nx; x != nx; ++x, ++i)
-          if (near[i]) body(i, Vec3f{float(x), float(row % ny), float(row / ny)});
-    });
-  }
-};
-
 std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
   const std::size_t cells = beam_.size();
   const int degree = int(phase_.size()) - 1;
-  const Nodes nodes{std::size_t(size_.x), std::size_t(size_.y), std::size_t(size_.z), near_.data()};
   const Vec3f eye = viewpoint.place ? worldToLattice_(*viewpoint.place) : Vec3f{},
               forward = viewpoint.forward ? normalize(worldToLattice_.linear * *viewpoint.forward) : Vec3f{};
   const auto away = [&](const Vec3f& node) {
@@ -71,16 +56,16 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
   std::vector<float> source(cells), own(cells);
   float beamWay[detail::kMostMoments] = {};
   if (towards_) detail::harmonics(-*towards_, degree, beamWay);
-  nodes.forEach([&](std::size_t i, const Vec3f& node) {
+  rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f& node) {
     float y[detail::kMostMoments], ways[detail::kMostMoments];
     detail::harmonics(-away(node), degree, y);
-    const float* way = beamWay;
+    const float *way = beamWay, *moments = moments_.data() + detail::CellRows::momentsAt(kept, sky_.size());
     if (place_) detail::harmonics(wayOfBeam(node), degree, ways), way = ways;
     float all = 0, beam = 0;
     for (int l = 0, m = 0; l <= degree; ++l) {
       const float weight = albedo_ * phase_[std::size_t(l)];
       for (; m != detail::momentCount(l); ++m) {
-        all += weight * y[m] * moments_[std::size_t(m) * cells + i];
+        all += weight * y[m] * moments[m * detail::CellRows::kVector];
         if (m == 0 || hasWay()) beam += weight * y[m] * (m == 0 ? 1.0f : way[m]);
       }
     }
@@ -88,7 +73,7 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
     source[i] = own[i] + ofBeam * beam * beam_[i];
   });
   std::vector<float> sent(cells);
-  nodes.forEach([&](std::size_t i, const Vec3f& node) {
+  rows_->forEachCell([&](std::size_t i, std::size_t, const Vec3f& node) {
     const Vec3f way = away(node);
     LineOfSight line{0, 1, density_[i], source[i]};
     float at = 0;
@@ -122,16 +107,15 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
 void ScatteredLight::sharpen(std::vector<float>& values) const {
   const std::size_t strides[3] = {1, std::size_t(size_.x), std::size_t(size_.x) * std::size_t(size_.y)};
   std::vector<float> sharp(values.size());
-  Nodes{std::size_t(size_.x), std::size_t(size_.y), std::size_t(size_.z), near_.data()}.forEach(
-      [&](std::size_t i, const Vec3f& node) {
-        float lacks = 0;
-        for (int axis = 0; axis != 3; ++axis)
-          if (node[axis] >= 1 && node[axis] <= float(size_[axis] - 2))
-            lacks += 2 * values[i] - values[i - strides[axis]] - values[i + strides[axis]];
-        const float least = std::min(0.5f * values[i], 2 * values[i]),
-                    most = std::max(0.5f * values[i], 2 * values[i]);
-        sharp[i] = std::clamp(values[i] + 0.125f * lacks, least, most);
-      });
+  rows_->forEachCell([&](std::size_t i, std::size_t, const Vec3f& node) {
+    float lacks = 0;
+    for (int axis = 0; axis != 3; ++axis)
+      if (node[axis] >= 1 && node[axis] <= float(size_[axis] - 2))
+        lacks += 2 * values[i] - values[i - strides[axis]] - values[i + strides[axis]];
+    const float least = std::min(0.5f * values[i], 2 * values[i]),
+                most = std::max(0.5f * values[i], 2 * values[i]);
+    sharp[i] = std::clamp(values[i] + 0.125f * lacks, least, most);
+  });
   values = std::move(sharp);
 }
 

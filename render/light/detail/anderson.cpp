@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/render/light/detail/cell_rows.h"
 
 namespace nephele::detail {
 
@@ -26,7 +27,8 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
   parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p != end; ++p)
       for (std::size_t i = p * piece; i != std::min(n, (p + 1) * piece); ++i) {
-        const float f = g[i] - x[i], weight = weights_[i];
+        const std::size_t at = CellRows::momentsAt(i, values_);
+        const float f = g[at] - x[at], weight = weights_[i];
         if (m > 0) df_[m - 1][i] = f - lastF_[i];
         if (weight == 0) continue;
         Products& sums = pieces[p];
@@ -47,19 +49,22 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
   lastF_.resize(n);
   lastG_.resize(x.size());
   std::vector<std::array<double, 2>> changes(pieces.size());
-  parallelFor((x.size() + piece - 1) / piece, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin * piece; i != std::min(x.size(), end * piece); ++i) {
-      if (!isFirst) dg_[m - 1][i] = g[i] - lastG_[i];
-      float next = g[i];
-      for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * dg_[r][i];
-      lastG_[i] = g[i];
-      if (i < n) {
-        lastF_[i] = g[i] - x[i];
-        std::array<double, 2>& sums = changes[i / piece];
-        sums[0] += double(weights_[i] * std::fabs(next - x[i]));
-        sums[1] += double(weights_[i] * std::fabs(next));
-      }
-      x[i] = next;
+  parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p != end; ++p) {
+      std::array<double, 2>& sums = changes[p];
+      for (std::size_t cell = p * piece; cell != std::min(n, (p + 1) * piece); cell += CellRows::kVector)
+        for (std::size_t k = 0, i = cell * values_; k != CellRows::kVector * values_; ++k, ++i) {
+          if (!isFirst) dg_[m - 1][i] = g[i] - lastG_[i];
+          float next = g[i];
+          for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * dg_[r][i];
+          lastG_[i] = g[i];
+          if (k < CellRows::kVector) {
+            lastF_[cell + k] = g[i] - x[i];
+            sums[0] += double(weights_[cell + k] * std::fabs(next - x[i]));
+            sums[1] += double(weights_[cell + k] * std::fabs(next));
+          }
+          x[i] = next;
+        }
     }
   });
   double change = 0, whole = 0;

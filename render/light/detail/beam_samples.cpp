@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 
 #include "nephele/modeling/base/parallel.h"
@@ -15,10 +16,15 @@ namespace nephele::detail {
 
 namespace {
 
-// Voxels from one sample to the next: two samples per voxel where a cell is hardly more than one; otherwise
-// every other voxel, where a sample between voxels is the mean of eight.
-float spacingOf(int factor) {
-  return factor <= 2 ? 0.5f : 2.0f;
+// Samples along a cell, none of them at a voxel, where they would see none of what is between. Where cells
+// are wide a sample between eight voxels stands for these.
+int samplesAlong(const LatticePlacement& place) {
+  return place.cellsPerBrick == 1 ? 4 : place.cellsPerBrick == 3 || place.cellsPerBrick == 4 ? 3 : 2;
+}
+
+// Voxels from one sample to the next.
+float spacingOf(const LatticePlacement& place) {
+  return place.voxelsPerCell() / float(samplesAlong(place));
 }
 
 // Mean of what is left of a beam along a sample of optical depth `depth`, whose middle it sees through
@@ -49,8 +55,8 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
                 Visit&& visit) {
   const BrickGrid& grid = volume.density();
   const std::vector<Vec3i>& occupied = volume.occupiedBricks();
-  const float spacing = spacingOf(place.factor);
-  const int across = int(float(BrickGrid::kBrick) / spacing), perBrick = BrickGrid::kBrick / place.factor;
+  const float spacing = spacingOf(place);
+  const int perBrick = place.cellsPerBrick, perCell = samplesAlong(place), across = perBrick * perCell;
   int low[SampleRow::kMost];
   float at[SampleRow::kMost], share[SampleRow::kMost];
   for (int n = 0; n != across; ++n) {
@@ -93,18 +99,17 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
             }
           }
           if (!(most > 0)) continue;
-          visit(SampleRow{
-              lattice.index(origin.x, origin.y + y * perBrick / across, origin.z + z * perBrick / across),
-              across / perBrick, Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
-              std::span<const float>(density, std::size_t(across))});
+          visit(SampleRow{lattice.index(origin.x, origin.y + y / perCell, origin.z + z / perCell), perCell,
+                          Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
+                          std::span<const float>(density, std::size_t(across))});
         }
     }
   });
 }
 
 float samplesPerCell(const LatticePlacement& place) {
-  const float across = float(place.factor) / spacingOf(place.factor);
-  return across * across * across;
+  const int along = samplesAlong(place);
+  return float(along * along * along);
 }
 
 }  // namespace
@@ -117,12 +122,34 @@ LatticePlacement::LatticePlacement(const RenderVolume& volume, int longestSide) 
   const Box box = volume.indexBounds();
   firstBrick = Vec3i(box.min * (1.0f / BrickGrid::kBrick)) - Vec3i{1, 1, 1};
   bricks = Vec3i(box.size() * (1.0f / BrickGrid::kBrick)) + Vec3i{2, 2, 2};
-  const int longest = std::max({bricks.x, bricks.y, bricks.z}) * BrickGrid::kBrick;
-  while (factor < BrickGrid::kBrick && longest / factor > longestSide) factor *= 2;
+  const int longest = std::max({bricks.x, bricks.y, bricks.z});
+  cellsPerBrick = std::clamp((2 * longestSide + longest) / (2 * longest), 1, BrickGrid::kBrick);
 }
 
 ScatteringLattice LatticePlacement::lattice() const {
-  return {bricks * (BrickGrid::kBrick / factor), factor};
+  return {bricks * cellsPerBrick, voxelsPerCell()};
+}
+
+double LatticePlacement::cells() const {
+  return double(bricks.x) * bricks.y * bricks.z * std::pow(cellsPerBrick, 3);
+}
+
+double LatticePlacement::cellsNear(const RenderVolume& volume, int reach) const {
+  ScatteringLattice occupied(bricks, float(BrickGrid::kBrick));
+  for (const Vec3i& brick : volume.occupiedBricks()) {
+    const Vec3i at = brick - firstBrick;
+    occupied.density[occupied.index(at.x, at.y, at.z)] = 1;
+  }
+  const std::vector<std::uint8_t> near = surroundings(occupied, (reach + cellsPerBrick - 1) / cellsPerBrick);
+  double sum = 0;
+  for (auto row = near.begin(); row != near.end(); row += occupied.size.x) {
+    const auto end = row + occupied.size.x, first = std::find(row, end, 1);
+    if (first == end) continue;
+    const auto last = std::find(std::make_reverse_iterator(end), std::make_reverse_iterator(row), 1).base();
+    // Rows begin and end with whole vectors.
+    sum += double((last - first) * cellsPerBrick + 2 * CellRows::kVector);
+  }
+  return sum * cellsPerBrick * cellsPerBrick;
 }
 
 void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice) {
@@ -137,7 +164,7 @@ void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const
                 float extinction, ScatteringLattice& lattice) {
   if (!source.columns && !source.glow) return;
   const BrickGrid& grid = volume.density();
-  const float spacing = spacingOf(place.factor), behind = extinction * source.shadow,
+  const float spacing = spacingOf(place), behind = extinction * source.shadow,
               perDensity = behind * grid.voxelSize() * spacing;
   forEachRow(volume, place, lattice, [&](const SampleRow& row) {
     const std::size_t count = row.density.size();

@@ -31,6 +31,13 @@ void harmonics(const Vec3f& way, int degree, float* out) {
   }
 }
 
+bool isOdd(int m, int axis) {
+  const int degree = degreeOf(m), order = m - degree * degree - degree;
+  const bool isSine = order < 0, isOddOrder = order % 2 != 0;
+  if (axis == 2) return (degree % 2 != 0) != isOddOrder;
+  return axis == 1 ? isSine : isSine != isOddOrder;
+}
+
 std::vector<Ordinate> levelSymmetric(int order) {
   struct Point {
     float x, y, z, weight;

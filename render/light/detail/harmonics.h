@@ -21,6 +21,9 @@ constexpr int degreeOf(int moment) {
 /// At a unit vector. Mirrored vectors have values that differ in their signs alone.
 void harmonics(const Vec3f& way, int degree, float* out);
 
+/// Whether value m of `harmonics` changes its sign with that of the vector along an axis.
+bool isOdd(int m, int axis);
+
 /// A direction and the share of the sphere that it stands for.
 struct Ordinate {
   Vec3f way;

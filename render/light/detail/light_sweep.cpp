@@ -11,53 +11,65 @@
 #include <utility>
 
 #include "nephele/modeling/base/parallel.h"
-#include "nephele/render/light/exp_of_minus.h"
 
 namespace nephele::detail {
 
 namespace {
 
-constexpr int kRow = ScatteringLattice::kRow;
+constexpr int kVector = CellRows::kVector;
+// Cells around slices, through which light comes in.
+constexpr int kRim = 1;
 
 // Lattices with fewer cells are swept by a thread per axis: waiting for each other after every slice would
 // take longer than the work.
 constexpr std::size_t kSmall = 1 << 16;
 
-// Calls each(plain, turned) with the index of every cell of `count` lattices, where x is the first axis and
-// where y is. Cells that lie near each other either way follow each other.
-template <class Each>
-void forEachTurned(const Vec3i& n, std::size_t count, Each&& each) {
-  const std::size_t nx = std::size_t(n.x), ny = std::size_t(n.y), nz = std::size_t(n.z);
-  parallelFor(nz * count, std::max<std::size_t>(4, kSmall / (nx * ny)),
-              [&](std::size_t begin, std::size_t end) {
-                for (std::size_t slice = begin; slice != end; ++slice) {
-                  const std::size_t z = slice % nz, first = slice / nz * nx * ny * nz;
-                  for (std::size_t y0 = 0; y0 != ny; y0 += kRow)
-                    for (std::size_t x0 = 0; x0 != nx; x0 += kRow)
-                      for (std::size_t y = y0; y != y0 + kRow; ++y)
-                        for (std::size_t x = x0; x != x0 + kRow; ++x)
-                          each(first + (z * ny + y) * nx + x, first + (x * nz + z) * ny + y);
-                }
-              });
+// Calls each(rows, turned rows) for all squares of cells, as often as they have values: where the values of
+// its rows are in `from`, and those of its turned rows in `to`, null where none are kept.
+template <class From, class To, class Each>
+void forEachSquare(const CellRows& plain, From* from, const CellRows& turned, To* to, std::size_t moments,
+                   Each&& each) {
+  const Vec3i n = plain.size();
+  parallelFor(std::size_t(n.z), 4, [&](std::size_t begin, std::size_t end) {
+    for (int z = int(begin); z != int(end); ++z)
+      for (int y = 0; y != n.y; y += kVector)
+        for (int x = 0; x != n.x; x += kVector) {
+          From* rows[kVector];
+          To* turnedRows[kVector];
+          bool some = false;
+          for (int i = 0; i != kVector; ++i) {
+            const CellRows::Row &row = plain.row(y + i, z), &other = turned.row(z, x + i);
+            rows[i] =
+                row.holds(x) ? from + CellRows::momentsAt(std::size_t(row.first + x), moments) : nullptr;
+            turnedRows[i] =
+                other.holds(y) ? to + CellRows::momentsAt(std::size_t(other.first + y), moments) : nullptr;
+            some = some || rows[i];
+          }
+          for (std::size_t m = 0; some && m != moments; ++m) {
+            each(rows, turnedRows);
+            for (int i = 0; i != kVector; ++i) {
+              if (rows[i]) rows[i] += kVector;
+              if (turnedRows[i]) turnedRows[i] += kVector;
+            }
+          }
+        }
+  });
 }
 
-// Copies lattices whose first axis is x to ones whose first axis is y.
-void turn(const float* from, float* to, const Vec3i& n, std::size_t count = 1) {
-  forEachTurned(n, count, [=](std::size_t plain, std::size_t turned) { to[turned] = from[plain]; });
-}
-
-// Adds what was turned, and what lies as it did, to `to`.
-void addTurned(const float* turned, const float* plain, float* to, const Vec3i& n, std::size_t count) {
-  forEachTurned(n, count, [=](std::size_t i, std::size_t t) { to[i] = to[i] + plain[i] + turned[t]; });
+// Copies the values of cells to those that are turned.
+void turn(const CellRows& plain, const float* from, const CellRows& turned, float* to, std::size_t moments) {
+  forEachSquare(plain, from, turned, to, moments,
+                [](const float* const(&rows)[kVector], float* const(&others)[kVector]) {
+                  turnSquare(rows, others, false);
+                });
 }
 
 }  // namespace
 
-LightSweep::LightSweep(const ScatteringLattice& lattice, float extinction, const std::vector<float>& phase,
-                       const std::vector<Ordinate>& ordinates, const std::vector<float>& inflow,
-                       const std::vector<std::uint8_t>& needed)
-    : lattice_(lattice),
-      extinction_(extinction),
+LightSweep::LightSweep(const CellRows& rows, const std::vector<float>& density, float extinction,
+                       const std::vector<float>& phase, const std::vector<Ordinate>& ordinates,
+                       const std::vector<float>& inflow)
+    : extinction_(extinction),
       ordinates_(ordinates),
       inflow_(inflow),
       momentCount_(phase.size() * phase.size()),
@@ -83,137 +95,123 @@ LightSweep::LightSweep(const ScatteringLattice& lattice, float extinction, const
       if (size[a] > size[axis] ||
           (size[a] == size[axis] && size[(a + 1) % 3] == size[axis] && size[(a + 2) % 3] < size[axis]))
         axis = a;
-    std::size_t length = 0;
-    while (length != lengths_.size() && lengths_[length] != 1 / size[axis]) ++length;
-    if (length == lengths_.size()) lengths_.push_back(1 / size[axis]);
     for (const bool rises : {false, true}) {
-      Group group{axis, rises, length, {}};
+      Group group{axis, rises, 1 / size[axis], {}};
       std::size_t count = 0;
       for (std::size_t i = first; i != first + 8; ++i)
         if ((ordinates[i].way[axis] > 0) == rises) group.ordinates[count++] = i;
       groups_.push_back(group);
     }
   }
-  addLayout(lattice.density, needed, lattice.size, plain_);
-  const Vec3i n = lattice.size;
-  std::vector<float> density(lattice.density.size()), floats(needed.begin(), needed.end()),
-      turnedNeeded(needed.size());
-  turn(lattice.density.data(), density.data(), n);
-  turn(floats.data(), turnedNeeded.data(), n);
-  addLayout(density, {turnedNeeded.begin(), turnedNeeded.end()}, {n.y, n.z, n.x}, turned_);
-  turnedMoments_.resize(momentCount_ * density.size());
-  turnedSums_.resize(momentCount_ * density.size());
-  sidewaysSums_.resize(momentCount_ * density.size());
-}
-
-void LightSweep::addLayout(const std::vector<float>& density, const std::vector<std::uint8_t>& needed,
-                           const Vec3i& size, Layout& layout) const {
-  layout.size = size;
-  for (const float length : lengths_) {
-    std::vector<float>&taken = layout.taken.emplace_back(density.size()),
-    &mean = layout.mean.emplace_back(density.size()),
-    &takenSlope = layout.takenSlope.emplace_back(density.size()),
-    &meanSlope = layout.meanSlope.emplace_back(density.size());
-    const float perDensity = extinction_ * length;
-    parallelFor(density.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i != end; ++i) {
-        const float depth = std::min(perDensity * density[i], 80.0f);
-        // (1 - exp(-depth)) / depth, by its series where the difference would lose its digits.
-        const float thin = 1 - depth * (0.5f - depth * (1.0f / 6));
-        mean[i] = depth < 0.03f ? thin : (1 - expOfMinus(depth)) / depth;
-        taken[i] = depth * mean[i];
-        takenSlope[i] =
-            depth < 0.1f ? depth * depth * (1.0f / 12 - depth * (1.0f / 24)) : 1 - mean[i] - 0.5f * taken[i];
-        meanSlope[i] = depth < 0.1f ? depth * (1.0f / 12 - depth * (1.0f / 24)) : takenSlope[i] / depth;
-      }
-    });
-  }
-  const std::size_t rows = density.size() / std::size_t(size.x);
-  layout.active.resize(rows);
-  for (std::size_t row = 0; row != rows; ++row) {
-    int begin = size.x, end = 0;
-    for (int x = 0; x != size.x; ++x)
-      if (const std::size_t i = row * std::size_t(size.x) + std::size_t(x); needed[i] || density[i] > 0)
-        begin = std::min(begin, x), end = x + 1;
-    if (begin >= end) begin = end = 0;
-    layout.active[row] = {std::uint16_t(begin / kRow * kRow), std::uint16_t((end + kRow - 1) / kRow * kRow)};
-  }
+  const Vec3i n = rows.size();
+  std::vector<std::uint8_t> matters(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+  rows.forEachRow([&](int y, int z, const CellRows::Row& row) {
+    for (int x = row.begin; x != row.end; ++x)
+      matters[std::size_t((x * n.z + z)) * std::size_t(n.y) + std::size_t(y)] = 1;
+  });
+  turnedRows_ = CellRows({n.y, n.z, n.x}, matters);
+  turnedDensity_.resize(turnedRows_.count());
+  turn(rows, density.data(), turnedRows_, turnedDensity_.data(), 1);
+  plain_ = {&rows, &density, {}};
+  turned_ = {&turnedRows_, &turnedDensity_, {}};
+  turnedMoments_.resize(momentCount_ * turnedRows_.count());
+  turnedSums_.resize(turnedMoments_.size());
+  if (rows.count() < kSmall) sidewaysSums_.resize(momentCount_ * rows.count());
 }
 
 void LightSweep::sweep(const std::vector<float>& moments, std::vector<float>& result, bool hasInflow) {
-  turn(moments.data(), turnedMoments_.data(), lattice_.size, momentCount_);
+  const CellRows& rows = *plain_.rows;
+  turn(rows, moments.data(), turnedRows_, turnedMoments_.data(), momentCount_);
   findSlopes(moments);
-  std::vector<float>* const sums[3] = {&turnedSums_, &sidewaysSums_, &result};
+  const bool isSmall = rows.count() < kSmall;
+  std::vector<float>* const sums[3] = {&turnedSums_, isSmall ? &sidewaysSums_ : &result, &result};
   const auto carryAlong = [&](std::size_t begin, std::size_t end) {
     for (std::size_t axis = begin; axis != end; ++axis) {
-      std::fill(sums[axis]->begin(), sums[axis]->end(), 0.0f);
-      for (const Group& group : groups_)
-        if (group.axis == int(axis))
-          carry(group, axis == 0 ? turnedMoments_ : moments, *sums[axis], hasInflow);
+      // Those along y and z are added up in one place, unless that is done at the same time.
+      if (axis != 2 || isSmall) std::fill(sums[axis]->begin(), sums[axis]->end(), 0.0f);
+      for (const bool rises : {false, true})
+        carry(int(axis), rises, axis == 0 ? turnedMoments_ : moments, *sums[axis], hasInflow);
     }
   };
-  if (lattice_.density.size() < kSmall)
+  if (isSmall)
     parallelFor(3, 1, carryAlong);
   else
     carryAlong(0, 3);
-  addTurned(turnedSums_.data(), sidewaysSums_.data(), result.data(), lattice_.size, momentCount_);
+  if (isSmall)
+    for (std::size_t i = 0; i != result.size(); ++i) result[i] += sidewaysSums_[i];
+  forEachSquare(
+      rows, result.data(), turnedRows_, static_cast<const float*>(turnedSums_.data()), momentCount_,
+      [](float* const(&to)[kVector], const float* const(&from)[kVector]) { turnSquare(from, to, true); });
 }
 
 // Central differences of the first moment; one-sided where a neighbour holds nothing.
 void LightSweep::findSlopes(const std::vector<float>& moments) {
-  const Vec3i n = lattice_.size;
-  const std::size_t strides[3] = {1, std::size_t(n.x), std::size_t(n.x) * std::size_t(n.y)};
+  const CellRows& rows = *plain_.rows;
+  const std::vector<float>& density = *plain_.density;
+  for (std::vector<float>& slopes : plain_.slopes) slopes.resize(rows.count());
+  const auto first = [&](std::size_t cell) { return moments[CellRows::momentsAt(cell, momentCount_)]; };
+  rows.forEachRow([&](int y, int z, const CellRows::Row& row) {
+    const auto holds = [&](const CellRows::Row* there, int x) {
+      return there && there->holds(x) && density[std::size_t(there->first + x)] > 0;
+    };
+    const auto rowAt = [&](int j, int k) {
+      return j >= 0 && k >= 0 && j != rows.size().y && k != rows.size().z ? &rows.row(j, k) : nullptr;
+    };
+    const CellRows::Row* const neighbours[3][2] = {
+        {&row, &row}, {rowAt(y - 1, z), rowAt(y + 1, z)}, {rowAt(y, z - 1), rowAt(y, z + 1)}};
+    for (int x = row.begin; x != row.end; ++x) {
+      const std::size_t i = std::size_t(row.first + x);
+      const bool isSolid = density[i] > 0;
+      for (int axis = 0; axis != 3; ++axis) {
+        const int step = axis == 0;
+        const auto [before, behind] = neighbours[axis];
+        float sum = 0, count = 0;
+        if (isSolid && holds(before, x - step))
+          sum += first(i) - first(std::size_t(before->first + x - step)), count += 1;
+        if (isSolid && holds(behind, x + step))
+          sum += first(std::size_t(behind->first + x + step)) - first(i), count += 1;
+        plain_.slopes[axis][i] = count > 0 ? sum / count : 0.0f;
+      }
+    }
+  });
   for (int axis = 0; axis != 3; ++axis) {
-    std::vector<float>& slopes = plain_.slopes[axis];
-    slopes.resize(lattice_.density.size());
-    parallelFor(std::size_t(n.z), std::max<std::size_t>(4, kSmall / strides[2]),
-                [&](std::size_t begin, std::size_t end) {
-                  for (int z = int(begin); z != int(end); ++z)
-                    for (int y = 0; y != n.y; ++y)
-                      for (int x = 0; x != n.x; ++x) {
-                        const std::size_t i = lattice_.index(x, y, z);
-                        slopes[i] = 0;
-                        if (!(lattice_.density[i] > 0)) continue;
-                        const int at = axis == 0 ? x : axis == 1 ? y : z;
-                        float sum = 0, count = 0;
-                        if (at > 0 && lattice_.density[i - strides[axis]] > 0)
-                          sum += moments[i] - moments[i - strides[axis]], count += 1;
-                        if (at + 1 < n[axis] && lattice_.density[i + strides[axis]] > 0)
-                          sum += moments[i + strides[axis]] - moments[i], count += 1;
-                        if (count > 0) slopes[i] = sum / count;
-                      }
-                });
-    turned_.slopes[axis].resize(slopes.size());
-    turn(slopes.data(), turned_.slopes[axis].data(), n);
+    turned_.slopes[axis].resize(turnedRows_.count());
+    turn(rows, plain_.slopes[axis].data(), turnedRows_, turned_.slopes[axis].data(), 1);
   }
 }
 
-void LightSweep::carry(const Group& group, const std::vector<float>& moments, std::vector<float>& sums,
-                       bool hasInflow) const {
+// Of four directions: what they do with a slice, and what goes through the slice before and this one.
+struct LightSweep::Wave {
+  SliceWork work;
+  std::array<std::vector<float>, 4> before, here;
+  std::size_t offsets[4];
+};
+
+LightSweep::Wave LightSweep::wave(const Group& group, const std::vector<float>& moments,
+                                  std::vector<float>& sums, bool hasInflow) const {
   const Layout& layout = group.axis == 0 ? turned_ : plain_;
   // Axes along a row, from row to row and from slice to slice.
   const int u = group.axis == 0 ? 1 : 0, v = group.axis == 2 ? 1 : 2, w = group.axis;
-  const Vec3i n = lattice_.size;
-  const int width = n[u], height = n[v], slices = n[w];
-  const std::size_t line = std::size_t(layout.size.x), plane = line * std::size_t(layout.size.y);
-  const std::size_t rowStride = group.axis == 1 ? plane : line, sliceStride = group.axis == 1 ? line : plane;
-  // Slices have a rim of cells through which light comes in.
-  constexpr int rim = 1;
-  const std::size_t planeStride = std::size_t(width + 2 * rim + kRow);
-  SliceWork work;
-  work.width = width;
-  work.rowStride = rowStride;
-  work.momentStride = lattice_.density.size();
-  work.momentCount = int(momentCount_);
+  const Vec3i n = plain_.rows->size();
+  const std::size_t planeStride = std::size_t(n[u] + 2 * kRim + kVector);
+  Wave wave;
+  SliceWork& work = wave.work;
+  work.width = n[u];
+  work.rowStride = group.axis == 1 ? std::size_t(layout.rows->size().y) : 1;
+  work.density = layout.density->data();
+  work.depthPerDensity = extinction_ * group.length;
+  work.slopes[0] = layout.slopes[u].data();
+  work.slopes[1] = layout.slopes[v].data();
+  work.slopes[2] = layout.slopes[w].data();
+  work.moments = moments.data();
+  work.sums = sums.data();
+  work.momentCount = momentCount_;
   work.planeStride = planeStride;
-  work.activeStride = rowStride / line;
-  std::array<std::vector<float>, 4> before, here;
-  std::size_t offsets[4];
   for (std::size_t k = 0; k != 4; ++k) {
     const std::size_t ordinate = group.ordinates[k];
     const Vec3f way = ordinates_[ordinate].way;
-    before[k].assign(planeStride * std::size_t(height + 2 * rim), hasInflow ? inflow_[ordinate] : 0.0f);
-    here[k] = before[k];
+    wave.before[k].assign(planeStride * std::size_t(n[v] + 2 * kRim), hasInflow ? inflow_[ordinate] : 0.0f);
+    wave.here[k] = wave.before[k];
     const float du = -way[u] / std::fabs(way[w]), dv = -way[v] / std::fabs(way[w]);
     const int iu = std::min(int(std::floor(du)), 0), iv = std::min(int(std::floor(dv)), 0);
     const float fu = du - float(iu), fv = dv - float(iv);
@@ -223,38 +221,49 @@ void LightSweep::carry(const Group& group, const std::vector<float>& moments, st
     work.ways[k].slopes[0] = perCell * way[u];
     work.ways[k].slopes[1] = perCell * way[v];
     work.ways[k].slopes[2] = perCell * way[w];
-    offsets[k] = std::size_t(iv + rim) * planeStride + std::size_t(iu + rim);
-    for (std::size_t m = 0; m != momentCount_; ++m) {
-      work.source[m][k] = sources_[ordinate][m];
-      work.sum[m][k] = sums_[ordinate][m];
-    }
+    wave.offsets[k] = std::size_t(iv + kRim) * planeStride + std::size_t(iu + kRim);
   }
-  const std::size_t grain = lattice_.density.size() < kSmall
+  const std::size_t first = group.ordinates[0];
+  int count = 0;
+  for (int kind = 0; kind != 4; ++kind) {
+    for (std::size_t m = 0; m != momentCount_; ++m)
+      if (isOdd(int(m), u) == (kind % 2 == 1) && isOdd(int(m), v) == (kind / 2 == 1))
+        work.parts[std::size_t(count++)] = {m * kVector, sources_[first][m], sums_[first][m]};
+    work.ends[std::size_t(kind)] = count;
+  }
+  return wave;
+}
+
+// All directions that rise along an axis, or fall, go through a slice while it is in the cache.
+void LightSweep::carry(int axis, bool rises, const std::vector<float>& moments, std::vector<float>& sums,
+                       bool hasInflow) const {
+  std::vector<Wave> waves;
+  for (const Group& group : groups_)
+    if (group.axis == axis && group.rises == rises) waves.push_back(wave(group, moments, sums, hasInflow));
+  const CellRows& rows = axis == 0 ? turnedRows_ : *plain_.rows;
+  const Vec3i n = plain_.rows->size();
+  const int height = n[axis == 2 ? 1 : 2], slices = n[axis];
+  const std::size_t sliceStride = axis == 1 ? 1 : std::size_t(rows.size().y);
+  const std::size_t grain = rows.count() < kSmall
                                 ? std::size_t(height)
-                                : std::max<std::size_t>(1, 4096 / std::size_t(width));
+                                : std::max<std::size_t>(1, 4096 / std::size_t(waves[0].work.width));
   for (int slice = 0; slice != slices; ++slice) {
-    const std::size_t first = std::size_t(group.rises ? slice : slices - 1 - slice) * sliceStride;
-    work.taken = layout.taken[group.length].data() + first;
-    work.mean = layout.mean[group.length].data() + first;
-    work.takenSlope = layout.takenSlope[group.length].data() + first;
-    work.meanSlope = layout.meanSlope[group.length].data() + first;
-    work.slopes[0] = layout.slopes[u].data() + first;
-    work.slopes[1] = layout.slopes[v].data() + first;
-    work.slopes[2] = layout.slopes[w].data() + first;
-    work.moments = moments.data() + first;
-    work.sums = sums.data() + first;
-    work.active = layout.active.data() + first / line;
-    for (std::size_t k = 0; k != 4; ++k) {
-      work.ways[k].before = before[k].data() + offsets[k];
-      work.ways[k].here = here[k].data() + rim * planeStride + rim;
+    for (Wave& wave : waves) {
+      wave.work.rows = rows.rows().data() + std::size_t(rises ? slice : slices - 1 - slice) * sliceStride;
+      for (std::size_t k = 0; k != 4; ++k) {
+        wave.work.ways[k].before = wave.before[k].data() + wave.offsets[k];
+        wave.work.ways[k].here = wave.here[k].data() + kRim * (wave.work.planeStride + 1);
+      }
     }
     parallelFor(std::size_t(height), grain, [&](std::size_t begin, std::size_t end) {
-      SliceWork rows = work;
-      rows.rowBegin = int(begin);
-      rows.rowEnd = int(end);
-      carrySlice(rows);
+      for (Wave& wave : waves) {
+        SliceWork work = wave.work;
+        work.rowBegin = int(begin);
+        work.rowEnd = int(end);
+        carrySlice(work);
+      }
     });
-    std::swap(before, here);
+    for (Wave& wave : waves) std::swap(wave.before, wave.here);
   }
 }
 

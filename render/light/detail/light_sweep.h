@@ -4,30 +4,36 @@
 #include <cstdint>
 #include <vector>
 
+#include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
-#include "nephele/render/light/detail/scattering_lattice.h"
 
 namespace nephele::detail {
 
 /// What carries light through a slice of a lattice in four directions that differ in signs alone.
 struct SliceWork {
-  /// Cells of a row, and rows.
+  /// Cells of a row, and rows; one row after `rowStride` of CellRows.
   int width = 0, rowBegin = 0, rowEnd = 0;
-  std::size_t rowStride = 0;
-  /// Of the first row: share that a cell takes of what comes in, and what it holds on average of that.
-  const float *taken = nullptr, *mean = nullptr;
-  /// The same of what the cell's own light grows by on the way through it.
-  const float *takenSlope = nullptr, *meanSlope = nullptr;
+  const CellRows::Row* rows = nullptr;
+  std::size_t rowStride = 1;
+  /// Of all cells, and the optical depth per density of the way through one.
+  const float* density = nullptr;
+  float depthPerDensity = 0;
   /// Slopes of the first moment along the row, from row to row and from slice to slice, per cell.
   const float* slopes[3] = {};
-  /// Moments of the light that is scattered, and of the sum; one moment after `momentStride` floats.
+  /// Moments of the light that is scattered, and of the sum, see CellRows::momentsAt.
   const float* moments = nullptr;
   float* sums = nullptr;
-  std::size_t momentStride = 0;
-  int momentCount = 1;
-  /// Cells of every row that hold something or are asked for, whole vectors.
-  const std::array<std::uint16_t, 2>* active = nullptr;
-  std::size_t activeStride = 1;
+  std::size_t momentCount = 1;
+  /// What a moment counts for in the first direction, and that for the moment. Sorted by the signs in the
+  /// other directions: alike in all, odd along the row, odd from row to row, odd in both; each kind ends at
+  /// `ends`.
+  struct Part {
+    std::size_t offset;
+    float source, sum;
+  };
+  std::array<Part, kMostMoments> parts{};
+  std::array<int, 4> ends{};
+  /// Every other one differs from the first in its sign along the row, the last two from row to row.
   struct Way {
     /// The slice before at the first of four cells that light comes in from, and this slice.
     const float* before;
@@ -37,60 +43,62 @@ struct SliceWork {
     float slopes[3];
   } ways[4];
   std::size_t planeStride = 0;
-  /// Per moment and direction.
-  float source[kMostMoments][4], sum[kMostMoments][4];
 };
 
 void carrySlice(const SliceWork& work);
 
+/// Copies vectors of cells side by side to the ones across them, or adds them to these. Null ones are zero,
+/// and not written.
+void turnSquare(const float* const (&from)[CellRows::kVector], float* const (&to)[CellRows::kVector],
+                bool adds);
+
 /// Carries light through one lattice in all directions.
 class LightSweep {
  public:
+  /// `rows`: the cells whose moments are wanted, all with density among them. `density`: theirs.
   /// `extinction`: per density and cell. `phase`: moments of the phase function times albedo, up to a degree.
-  /// `inflow`: what comes in along each of the ordinates. `needed`: cells whose moments are wanted beside
-  /// those with density. All must outlive it but `needed` and `phase`.
-  LightSweep(const ScatteringLattice& lattice, float extinction, const std::vector<float>& phase,
-             const std::vector<Ordinate>& ordinates, const std::vector<float>& inflow,
-             const std::vector<std::uint8_t>& needed);
+  /// `inflow`: what comes in along each of the ordinates. All must outlive it but `phase`.
+  LightSweep(const CellRows& rows, const std::vector<float>& density, float extinction,
+             const std::vector<float>& phase, const std::vector<Ordinate>& ordinates,
+             const std::vector<float>& inflow);
 
-  /// Moments of the light in every cell that is needed, given those of the light that is scattered; moment m
-  /// of cell i is at m * cells + i. Nothing comes in unless `hasInflow`.
+  /// Moments of the light in every cell that is kept, given those of the light that is scattered, see
+  /// CellRows::momentsAt. Nothing comes in unless `hasInflow`.
   void sweep(const std::vector<float>& moments, std::vector<float>& result, bool hasInflow = true);
 
  private:
   // The lattice as it lies, or turned so that x is the slowest axis.
   struct Layout {
-    Vec3i size;
-    std::vector<std::vector<float>> taken, mean, takenSlope, meanSlope;
+    const CellRows* rows;
+    const std::vector<float>* density;
     std::vector<float> slopes[3];
-    // Of rows along the first axis.
-    std::vector<std::array<std::uint16_t, 2>> active;
   };
-  // Four directions: a cell's path, how far light moves sideways per slice, and their ordinates.
+  // Four directions along an axis, and the length of a cell on their way.
   struct Group {
     int axis;
     bool rises;
-    std::size_t length;
+    float length;
     std::array<std::size_t, 4> ordinates;
   };
 
-  void addLayout(const std::vector<float>& density, const std::vector<std::uint8_t>& needed,
-                 const Vec3i& size, Layout& layout) const;
   void findSlopes(const std::vector<float>& moments);
-  void carry(const Group& group, const std::vector<float>& moments, std::vector<float>& sums,
+  struct Wave;
+  Wave wave(const Group& group, const std::vector<float>& moments, std::vector<float>& sums,
+            bool hasInflow) const;
+  void carry(int axis, bool rises, const std::vector<float>& moments, std::vector<float>& sums,
              bool hasInflow) const;
 
-  const ScatteringLattice& lattice_;
   float extinction_;
   const std::vector<Ordinate>& ordinates_;
   const std::vector<float>& inflow_;
   std::size_t momentCount_;
   float scattered_;
-  std::vector<float> lengths_;
   std::vector<Group> groups_;
+  CellRows turnedRows_;
+  std::vector<float> turnedDensity_;
   Layout plain_, turned_;
   std::vector<std::array<float, kMostMoments>> sources_, sums_;
-  // Sums of the directions along x and y, added to those along z in a fixed order.
+  // Moments and sums of the directions along x, and in small lattices the sums of those along y.
   std::vector<float> turnedMoments_, turnedSums_, sidewaysSums_;
 };
 

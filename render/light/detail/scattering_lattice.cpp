@@ -1,12 +1,12 @@
 #include "nephele/render/light/detail/scattering_lattice.h"
 
-#include "nephele/modeling/base/parallel.h"
+#include <utility>
 
 namespace nephele::detail {
 
 ScatteringLattice halved(const ScatteringLattice& fine) {
   const Vec3i n = fine.size;
-  ScatteringLattice coarse({(n.x + 1) / 2, (n.y + 1) / 2, (n.z + 1) / 2}, 2 * fine.factor);
+  ScatteringLattice coarse({(n.x + 1) / 2, (n.y + 1) / 2, (n.z + 1) / 2}, 2 * fine.voxels);
   for (int z = 0; z != n.z; ++z)
     for (int y = 0; y != n.y; ++y)
       for (int x = 0; x != n.x; ++x) {
@@ -23,22 +23,32 @@ ScatteringLattice halved(const ScatteringLattice& fine) {
 }
 
 // Cell i of `coarse` holds the cells 2 i and 2 i + 1.
-void refine(const float* values, const ScatteringLattice& coarse, const ScatteringLattice& fine, float* out) {
-  parallelFor(std::size_t(fine.size.z), 16, [&](std::size_t begin, std::size_t end) {
-    const auto neighbour = [](int i, int count) {
-      return std::clamp(i / 2 + (i % 2 ? 1 : -1), 0, count - 1);
-    };
-    for (int z = int(begin); z != int(end); ++z)
-      for (int y = 0; y != fine.size.y; ++y)
-        for (int x = 0; x != fine.size.x; ++x) {
-          const int ox = neighbour(x, coarse.size.x), oy = neighbour(y, coarse.size.y),
-                    oz = neighbour(z, coarse.size.z);
-          const auto row = [&](int j, int k) {
-            return 0.75f * values[coarse.index(x / 2, j, k)] + 0.25f * values[coarse.index(ox, j, k)];
-          };
-          const auto plane = [&](int k) { return 0.75f * row(y / 2, k) + 0.25f * row(oy, k); };
-          out[fine.index(x, y, z)] = 0.75f * plane(z / 2) + 0.25f * plane(oz);
-        }
+void refine(const float* values, const CellRows& coarse, const CellRows& fine, std::size_t moments,
+            float* out, bool adds) {
+  constexpr int vector = CellRows::kVector;
+  const auto neighbour = [](int i, int count) { return std::clamp(i / 2 + (i % 2 ? 1 : -1), 0, count - 1); };
+  const Vec3i n = coarse.size();
+  fine.forEachRow([&](int y, int z, const CellRows::Row& row) {
+    const int oy = neighbour(y, n.y), oz = neighbour(z, n.z);
+    const std::pair<const CellRows::Row*, float> around[] = {{&coarse.row(y / 2, z / 2), 0.5625f},
+                                                             {&coarse.row(oy, z / 2), 0.1875f},
+                                                             {&coarse.row(y / 2, oz), 0.1875f},
+                                                             {&coarse.row(oy, oz), 0.0625f}};
+    const int first = std::max(row.begin / 2 - 1, 0) / vector * vector, last = std::min(row.end / 2, n.x - 1);
+    const auto place = [&](int x) { return CellRows::momentsAt(std::size_t(x - first), moments); };
+    std::vector<float> mixed(place(last / vector * vector + vector));
+    for (const auto& [there, share] : around)
+      for (int x = std::max<int>(first, there->begin); x < std::min<int>(last + 1, there->end); x += vector) {
+        const float* from = values + CellRows::momentsAt(std::size_t(there->first + x), moments);
+        float* to = mixed.data() + place(x);
+        for (std::size_t i = 0; i != moments * vector; ++i) to[i] += share * from[i];
+      }
+    for (int x = row.begin; x != row.end; ++x) {
+      const float *near = mixed.data() + place(x / 2), *far = mixed.data() + place(neighbour(x, n.x));
+      float* to = out + CellRows::momentsAt(std::size_t(row.first + x), moments);
+      for (std::size_t i = 0; i != moments * vector; i += vector)
+        to[i] = (adds ? to[i] : 0.0f) + (0.75f * near[i] + 0.25f * far[i]);
+    }
   });
 }
 

@@ -5,26 +5,27 @@
 #include <vector>
 
 #include "nephele/modeling/base/math.h"
+#include "nephele/render/light/detail/cell_rows.h"
 
 namespace nephele::detail {
 
 /// Cells that light is scattered in.
 struct ScatteringLattice {
-  /// Rows along x and y are whole vectors of this many cells.
-  static constexpr int kRow = 8;
-
+  /// Along x and y whole vectors of CellRows.
   Vec3i size;
-  /// Voxels along a cell.
-  int factor;
+  /// Edge of a cell, in voxels.
+  float voxels;
   /// Mean density of every cell, and the first source of light where its density is, see ScatteredLight.
   std::vector<float> density, beam;
 
-  ScatteringLattice(const Vec3i& n, int voxels)
+  ScatteringLattice(const Vec3i& n, float edge)
       : size{rounded(n.x), rounded(n.y), n.z},
-        factor(voxels),
+        voxels(edge),
         density(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z)),
         beam(density.size()) {}
-  static constexpr int rounded(int n) { return (n + kRow - 1) / kRow * kRow; }
+  static constexpr int rounded(int n) {
+    return (n + CellRows::kVector - 1) / CellRows::kVector * CellRows::kVector;
+  }
   std::size_t index(int x, int y, int z) const {
     return (std::size_t(z) * std::size_t(size.y) + std::size_t(y)) * std::size_t(size.x) + std::size_t(x);
   }
@@ -35,8 +36,11 @@ struct ScatteringLattice {
 /// Cells twice as wide.
 ScatteringLattice halved(const ScatteringLattice& fine);
 
-/// Values of `coarse` on the lattice that it is `halved` of, interpolated linearly.
-void refine(const float* values, const ScatteringLattice& coarse, const ScatteringLattice& fine, float* out);
+/// Values of the cells of `coarse` for those of the lattice that it is `halved` of, interpolated linearly;
+/// cells that are not kept count as 0. See CellRows::momentsAt.
+/// Added to `out` if `adds`.
+void refine(const float* values, const CellRows& coarse, const CellRows& fine, std::size_t moments,
+            float* out, bool adds = false);
 
 /// Mean density that light meets where there is any.
 float typicalDensity(const ScatteringLattice& lattice);

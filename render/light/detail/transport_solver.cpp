@@ -5,6 +5,7 @@
 #include "nephele/render/light/detail/transport_solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "nephele/modeling/base/parallel.h"
@@ -18,22 +19,47 @@ constexpr int kCoarsest = 24;
 // What is missing need not be known well.
 constexpr int kSweepsOfError = 2, kSweepsOfCoarsest = 40;
 constexpr float kToleranceOfError = 0.1f;
+// Sweeps of coarser lattices cost little, and what they leave would have to be mended on finer ones.
+constexpr float kTightened = 0.1f;
+// What cells half as wide change is this many times what the error that is left is: 1 / (2^p - 1) times for
+// one that falls with their width to the power p, which measures between 1 and 2.
+constexpr float kExtrapolated = 0.5f;
 
-// Means over the cells that a coarse one holds, weighed by their density.
-void restrict(const float* values, const ScatteringLattice& fine, const ScatteringLattice& coarse,
-              float* out) {
-  const Vec3i n = fine.size;
-  parallelFor(std::size_t(coarse.size.z), 16, [&](std::size_t begin, std::size_t end) {
-    const std::size_t plane = std::size_t(coarse.size.x) * std::size_t(coarse.size.y);
-    std::fill(out + begin * plane, out + end * plane, 0.0f);
-    for (int z = 2 * int(begin); z < std::min(2 * int(end), n.z); ++z)
-      for (int y = 0; y != n.y; ++y)
-        for (int x = 0; x != n.x; ++x) {
-          const std::size_t i = fine.index(x, y, z);
-          out[coarse.index(x / 2, y / 2, z / 2)] += fine.density[i] * values[i];
+// Means over the cells that a coarse one holds, weighed by their density, of what `values` have more than
+// `before`.
+void restrict(const float* values, const float* before, const CellRows& fine,
+              const std::vector<float>& fineDensity, const CellRows& coarse,
+              const std::vector<float>& coarseDensity, std::size_t moments, float* out) {
+  constexpr int vector = CellRows::kVector;
+  const Vec3i n = fine.size();
+  coarse.forEachRow([&](int y, int z, const CellRows::Row& row) {
+    const std::size_t begin = CellRows::momentsAt(std::size_t(row.first + row.begin), moments),
+                      end = CellRows::momentsAt(std::size_t(row.first + row.end), moments);
+    std::fill(out + begin, out + end, 0.0f);
+    for (int k = 2 * z; k < std::min(2 * z + 2, n.z); ++k)
+      for (int j = 2 * y; j < std::min(2 * y + 2, n.y); ++j) {
+        const CellRows::Row& from = fine.row(j, k);
+        for (int x = std::max<int>(from.begin, 2 * row.begin); x < std::min<int>(from.end, 2 * row.end);
+             ++x) {
+          const std::size_t cell = std::size_t(from.first + x);
+          const float density = fineDensity[cell];
+          if (!(density > 0)) continue;
+          const std::size_t at = CellRows::momentsAt(cell, moments);
+          float* to = out + CellRows::momentsAt(std::size_t(row.first + x / 2), moments);
+          if (before)
+            for (std::size_t i = 0; i != moments * vector; i += vector)
+              to[i] += density * (values[at + i] - before[at + i]);
+          else
+            for (std::size_t i = 0; i != moments * vector; i += vector) to[i] += density * values[at + i];
         }
-    for (std::size_t i = begin * plane; i != end * plane; ++i)
-      out[i] = coarse.density[i] > 0 ? out[i] / (8 * coarse.density[i]) : 0.0f;
+      }
+    for (int x = row.begin; x != row.end; ++x) {
+      const std::size_t cell = std::size_t(row.first + x);
+      const float density = coarseDensity[cell];
+      float* to = out + CellRows::momentsAt(cell, moments);
+      for (std::size_t i = 0; i != moments * vector; i += vector)
+        to[i] = density > 0 ? to[i] / (8 * density) : 0.0f;
+    }
   });
 }
 
@@ -49,45 +75,71 @@ void forEach(std::size_t count, Each&& each) {
 
 TransportSolver::TransportSolver(ScatteringLattice finest, Medium medium)
     : medium_(std::move(medium)), moments_(medium_.phase.size() * medium_.phase.size()) {
-  levels_.push_back({std::move(finest), nullptr});
+  levels_.push_back({std::move(finest), {}, {}, nullptr});
   // Without scattering one sweep tells all.
   if (medium_.phase[0] > 0)
     while (levels_.back().lattice.longest() > kCoarsest)
-      levels_.push_back({halved(levels_.back().lattice), nullptr});
+      levels_.push_back({halved(levels_.back().lattice), {}, {}, nullptr});
   float extinction = medium_.extinction;
   for (Level& level : levels_) {
-    level.sweep = std::make_unique<LightSweep>(level.lattice, extinction, medium_.phase, medium_.ordinates,
-                                               medium_.inflow, surroundings(level.lattice, 2));
+    level.rows = CellRows(level.lattice.size, surroundings(level.lattice, kReach));
+    level.density = level.rows.kept(level.lattice.density);
+    level.sweep = std::make_unique<LightSweep>(level.rows, level.density, extinction, medium_.phase,
+                                               medium_.ordinates, medium_.inflow);
     extinction *= 2;
   }
 }
 
 std::vector<float> TransportSolver::solve(const std::vector<float>& guess, const AddFirst& addFirst,
                                           const Limits& limits, const Progress& progress) {
-  std::vector<float> light;
+  std::vector<float> light, coarser;
   for (std::size_t level = levels_.size(); level-- != 0;) {
-    const ScatteringLattice& lattice = levels_[level].lattice;
-    const std::size_t cells = lattice.density.size();
+    const Level& here = levels_[level];
+    const std::size_t cells = here.rows.count();
     std::vector<float> begun(moments_ * cells);
-    for (std::size_t m = 0; m != moments_; ++m)
-      if (level + 1 == levels_.size())
-        std::fill_n(begun.begin() + std::ptrdiff_t(m * cells), cells, guess[m]);
-      else
-        refine(light.data() + m * levels_[level + 1].lattice.density.size(), levels_[level + 1].lattice,
-               lattice, begun.data() + m * cells);
+    if (level + 1 == levels_.size())
+      forEach(begun.size(), [&](std::size_t i) { begun[i] = guess[i / CellRows::kVector % moments_]; });
+    else
+      refine(light.data(), levels_[level + 1].rows, here.rows, moments_, begun.data());
+    coarser = std::move(light);
     light = std::move(begun);
-    const float wider = float(lattice.factor) / float(finest().factor);
     iterate(
-        level, light, [&](std::vector<float>& moments) { addFirst(lattice, wider, moments); }, true,
-        {level == 0 ? limits.sweeps : kSweepsOfCoarsest, limits.tolerance}, progress);
+        level, light, [&](std::vector<float>& moments) { addFirst(here.lattice, here.rows, moments); }, true,
+        level == 0 ? limits : Limits{kSweepsOfCoarsest, kTightened * limits.tolerance}, progress);
   }
+  if (levels_.size() > 1) extrapolate(coarser, light);
   return light;
+}
+
+void TransportSolver::extrapolate(const std::vector<float>& coarser, std::vector<float>& light) const {
+  const Level &fine = levels_[0], &coarse = levels_[1];
+  const std::size_t cells = fine.rows.count(), coarseCells = coarse.rows.count();
+  std::vector<float> holds(coarseCells), near(cells), change(coarser.size()), grown(light.size());
+  forEach(coarseCells, [&](std::size_t i) { holds[i] = coarse.density[i] > 0; });
+  refine(holds.data(), coarse.rows, fine.rows, 1, near.data());
+  restrict(light.data(), nullptr, fine.rows, fine.density, coarse.rows, coarse.density, moments_,
+           change.data());
+  forEach(coarseCells, [&](std::size_t i) {
+    for (std::size_t m = 0, at = CellRows::momentsAt(i, moments_); m != moments_;
+         ++m, at += CellRows::kVector)
+      change[at] = holds[i] > 0 ? change[at] - coarser[at] : 0.0f;
+  });
+  refine(change.data(), coarse.rows, fine.rows, moments_, grown.data());
+  const std::vector<float> beam = fine.rows.kept(fine.lattice.beam);
+  forEach(cells, [&](std::size_t i) {
+    if (!(near[i] > 0)) return;
+    const std::size_t at = CellRows::momentsAt(i, moments_);
+    const float share = kExtrapolated / near[i], most = 0.5f * std::max(light[at] - beam[i], 0.0f),
+                by = share * std::fabs(grown[at]), limited = by > most ? share * most / by : share;
+    for (std::size_t m = 0; m != moments_ * CellRows::kVector; m += CellRows::kVector)
+      light[at + m] += limited * grown[at + m];
+  });
 }
 
 void TransportSolver::iterate(std::size_t level, std::vector<float>& light,
                               const std::function<void(std::vector<float>&)>& add, bool hasInflow,
                               const Limits& limits, const Progress& progress) {
-  Anderson anderson(levels_[level].lattice.density);
+  Anderson anderson(levels_[level].density, moments_);
   std::vector<float> swept(light.size());
   for (int sweep = 1;; ++sweep) {
     progress.check();
@@ -111,14 +163,10 @@ void TransportSolver::iterate(std::size_t level, std::vector<float>& light,
 // Adds to what was swept what is still missing of it.
 void TransportSolver::addCoarse(std::size_t level, const std::vector<float>& light, std::vector<float>& swept,
                                 const Progress& progress) {
-  const ScatteringLattice &fine = levels_[level].lattice, &coarse = levels_[level + 1].lattice;
-  const std::size_t cells = fine.density.size(), coarseCells = coarse.density.size();
-  std::vector<float> rest(moments_ * coarseCells), buffer(cells);
-  for (std::size_t m = 0; m != moments_; ++m) {
-    const float *before = light.data() + m * cells, *after = swept.data() + m * cells;
-    forEach(cells, [&](std::size_t i) { buffer[i] = after[i] - before[i]; });
-    restrict(buffer.data(), fine, coarse, rest.data() + m * coarseCells);
-  }
+  const Level &fine = levels_[level], &coarse = levels_[level + 1];
+  std::vector<float> rest(moments_ * coarse.rows.count());
+  restrict(swept.data(), light.data(), fine.rows, fine.density, coarse.rows, coarse.density, moments_,
+           rest.data());
   std::vector<float> missing = rest;
   iterate(
       level + 1, missing,
@@ -127,11 +175,7 @@ void TransportSolver::addCoarse(std::size_t level, const std::vector<float>& lig
       },
       false, {level + 2 == levels_.size() ? kSweepsOfCoarsest : kSweepsOfError, kToleranceOfError}, progress);
   forEach(missing.size(), [&](std::size_t i) { missing[i] -= rest[i]; });
-  for (std::size_t m = 0; m != moments_; ++m) {
-    refine(missing.data() + m * coarseCells, coarse, fine, buffer.data());
-    float* after = swept.data() + m * cells;
-    forEach(cells, [&](std::size_t i) { after[i] += buffer[i]; });
-  }
+  refine(missing.data(), coarse.rows, fine.rows, moments_, swept.data(), true);
 }
 
 }  // namespace nephele::detail

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -14,6 +15,9 @@ namespace nephele::detail {
 /// Finds the light x = K x + b in a lattice, K a LightSweep and b the light of a first source, as moments.
 class TransportSolver {
  public:
+  /// Cells away from density whose light is known, too.
+  static constexpr int kReach = 2;
+
   struct Medium {
     /// Per density and cell of the finest lattice.
     float extinction = 1;
@@ -23,8 +27,8 @@ class TransportSolver {
     /// What comes in along each of the ordinates.
     std::vector<float> inflow;
   };
-  /// Adds b to moments of a lattice whose cells are so many times wider than the finest ones.
-  using AddFirst = std::function<void(const ScatteringLattice&, float, std::vector<float>&)>;
+  /// Adds b to the moments of a lattice's cells.
+  using AddFirst = std::function<void(const ScatteringLattice&, const CellRows&, std::vector<float>&)>;
 
   TransportSolver(ScatteringLattice finest, Medium medium);
 
@@ -34,17 +38,23 @@ class TransportSolver {
     int sweeps;
     float tolerance;
   };
-  /// `guess`: moments of the light to begin with, the same everywhere.
+  /// `guess`: moments of the light to begin with, the same everywhere. Returns moments of the cells of
+  /// finestRows(), see CellRows::momentsAt.
   std::vector<float> solve(const std::vector<float>& guess, const AddFirst& addFirst, const Limits& limits,
                            const Progress& progress);
 
   ScatteringLattice& finest() { return levels_[0].lattice; }
+  /// Cells with density, and those within reach of them.
+  CellRows& finestRows() { return levels_[0].rows; }
   int sweeps() const { return sweeps_; }
   float residual() const { return residual_; }
 
  private:
   struct Level {
     ScatteringLattice lattice;
+    CellRows rows;
+    // Of the cells that are kept.
+    std::vector<float> density;
     std::unique_ptr<LightSweep> sweep;
   };
 
@@ -54,8 +64,11 @@ class TransportSolver {
   void addCoarse(std::size_t level, const std::vector<float>& light, std::vector<float>& swept,
                  const Progress& progress);
 
+  void extrapolate(const std::vector<float>& coarser, std::vector<float>& light) const;
+
   Medium medium_;
-  std::vector<Level> levels_;
+  // Each stays where it is: its sweep refers to it.
+  std::deque<Level> levels_;
   std::size_t moments_;
   int sweeps_ = 0;
   float residual_ = 0;

@@ -98,7 +98,8 @@ TEST(ScatteredLight, IsTheSameAtAnyNumberOfThreads) {
 }
 
 TEST(ScatteredLight, EndsWithinItsTolerance) {
-  // Thirty times as many sweeps change no more than the estimate of the error says.
+  // A sweep leaves about as much to change as it has changed, one and a half times that with what is
+  // extrapolated from it: sixty sweeps change no more of all light, and little of it where it is dark.
   const RenderVolume volume(ball(1.0f, 0.06f));
   const LightVolume sun(volume, {1, 1, 0});
   const ScatteredSource source = ScatteredSource::of(sun, {1, 1, 0});
@@ -109,8 +110,15 @@ TEST(ScatteredLight, EndsWithinItsTolerance) {
   const ScatteredLight limit(volume, scattering(40.0f, 0.999f, 0.3f), source, exact);
   EXPECT_LT(light.residual(), ScatteredLight::Options{}.tolerance);
   EXPECT_LE(light.sweeps(), 8);
-  for (const Vec3f& p : {Vec3f{0, 0, 0}, Vec3f{0.5f, 0.5f, 0}, Vec3f{-0.6f, -0.6f, 0}})
-    EXPECT_NEAR(light.meanAt(p) / limit.meanAt(p), 1, 3e-3) << p.x;
+  const std::vector<float> mean = light.mean(), exactMean = limit.mean();
+  double change = 0, whole = 0;
+  for (std::size_t i = 0; i != mean.size(); ++i) {
+    change += std::fabs(double(mean[i]) - double(exactMean[i]));
+    whole += double(exactMean[i]);
+  }
+  EXPECT_LT(change, 2 * double(ScatteredLight::Options{}.tolerance) * whole);
+  for (const Vec3f& p : {Vec3f{0.5f, 0.5f, 0}, Vec3f{0, 0, 0}, Vec3f{-0.6f, -0.6f, 0}})
+    EXPECT_NEAR(light.meanAt(p) / limit.meanAt(p), 1, 0.025) << p.x;
 }
 
 TEST(ScatteredLight, ConvergesQuicklyWhereForwardScatteringCoversManyCells) {
