@@ -85,7 +85,9 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
             p.z < float(size_.z)))
         break;
       const detail::LatticePoint there(size_, p);
-      line.step(length, depthPerDensity_, there.of(density_.data()), there.of(source.data()));
+      // Far from density nothing is known of the source.
+      const float density = there.of(density_.data());
+      line.step(length, depthPerDensity_, density, density > 0 ? there.of(source.data()) : line.source);
     }
     float sky = 0;
     if (sky_[0] != 0) {

@@ -19,7 +19,7 @@ namespace {
 // Samples along a cell, none of them at a voxel, where they would see none of what is between. Where cells
 // are wide a sample between eight voxels stands for these.
 int samplesAlong(const LatticePlacement& place) {
-  return place.cellsPerBrick == 1 ? 4 : place.cellsPerBrick == 3 || place.cellsPerBrick == 4 ? 3 : 2;
+  return place.cellsPerBrick == 1 ? 4 : place.cellsPerBrick == 4 ? 3 : 2;
 }
 
 // Voxels from one sample to the next.
@@ -115,7 +115,7 @@ float samplesPerCell(const LatticePlacement& place) {
 }  // namespace
 
 bool readsOwnNodes(const LatticePlacement& place) {
-  return 0.5f * spacingOf(place.factor) >= 0.5f;
+  return spacingOf(place) >= 1.0f;
 }
 
 LatticePlacement::LatticePlacement(const RenderVolume& volume, int longestSide) {
