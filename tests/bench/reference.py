@@ -13,7 +13,7 @@ Sets (--what):
 Steps (--do; all of them, in this order, if none is given):
   trace    path traces the references: part after part of 64 samples, each with its own seed, until a picture has what its set wants
            (--parts says how many). Parts that are in FOLDER are kept, so that this can be stopped, resumed and extended.
-  march    marches at --quality draft, good and final, and traces at 16 samples; best of --runs. Made again every time.
+  march    marches at --quality draft, good and final, again every time; the least seconds of --runs count. Traces at 16 samples, once.
   cycles   renders disney and cumulus with Blender's Cycles (Debian's blender), if it is installed; kept like parts.
   report   prints the tables as Markdown; with --page, puts tables into that page between <!-- table NAME --> and <!-- end of table -->,
            and plots and pictures into the folder pictures beside it.
@@ -144,7 +144,9 @@ def march(options, scene):
         return
     for quality in ("draft", "good", "final"):
         render(options, scene, f"march/{scene.name}_{quality}", ["--quality", quality], options.runs)
-    render(options, scene, f"march/{scene.name}_path_16", ["--integrator", "path", "--spp", "16", "--seed", "1000"])
+    name = f"parts/{scene.name}_short"
+    if not os.path.exists(inside(options, name + ".exr")):
+        render(options, scene, name, ["--integrator", "path", "--spp", "16", "--seed", "1000"])
 
 
 def camera_of(picture):

@@ -37,24 +37,21 @@ def parts_of(options, scene):
 def rows_of(options, scene):
     parts, seconds = parts_of(options, scene)
     reference, rows = Reference(parts), []
-    for quality in ("draft", "good", "final", "path_16"):
-        path = inside(options, f"march/{scene.name}_{quality}")
-        if os.path.exists(path + ".exr"):
-            kind, label = ("path", "path, 16 samples") if quality == "path_16" else ("march", f"`--quality {quality}`")
-            times = load(path + ".json")
-            taken = times["wall"] if options.wall and kind == "march" else times["processor"] / 2
-            rows.append(Row(kind, label, taken, reference.errors(Picture.read(path + ".exr"))))
+    names = [("march", f"`--quality {quality}`", f"march/{scene.name}_{quality}") for quality in ("draft", "good", "final")]
+    names += [("path", "path, 16 samples", f"parts/{scene.name}_short")]
+    names += [("Cycles", f"Cycles, {samples} samples", f"cycles/{scene.name}_{samples}") for samples in options.cycles_samples]
+    names = [(kind, label, inside(options, name)) for kind, label, name in names if os.path.exists(inside(options, name + ".json"))]
+    pictures = Picture.read(*(path + ".exr" for _, _, path in names)) if len(names) > 1 else []
+    for (kind, label, path), picture in zip(names, pictures):
+        times = load(path + ".json")
+        taken = times["wall"] if options.wall and kind == "march" else times["processor"] / 2
+        rows.append(Row(kind, label, taken, reference.errors(picture)))
     for count in (1, 4):
         if len(parts) >= count + 2:
             errors = Reference(parts[count:]).errors(Picture.mean_of(parts[:count]))
             rows.append(Row("path", f"path, {PART * count} samples", sum(seconds[:count]) / 2, errors))
     if len(parts) > 1:
         rows.append(Row("path", f"path, {reference.samples} samples (the reference)", sum(seconds) / 2, reference.own_errors()))
-    for samples in options.cycles_samples:
-        path = inside(options, f"cycles/{scene.name}_{samples}")
-        if os.path.exists(path + ".json"):
-            rows.append(Row("Cycles", f"Cycles, {samples} samples", load(path + ".json")["processor"] / 2,
-                            reference.errors(Picture.read(path + ".exr"))))
     return rows
 
 
@@ -73,7 +70,7 @@ def cells(errors):
 
 def cloud_table(by_sun):
     """Rows of the same label side by side, seconds averaged over the suns."""
-    labels = list(dict.fromkeys(row.label for rows in by_sun.values() for row in rows))
+    labels = list(dict.fromkeys(row.label for kind in COLOURS for rows in by_sun.values() for row in rows if row.kind == kind))
     lines = ["| | seconds | " + " | ".join(f"{sun}: mean / rms / worst, % | relMSE" for sun in by_sun) + " |",
              "|---" * (2 + 2 * len(by_sun)) + "|"]
     for label in labels:
