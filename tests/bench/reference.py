@@ -21,9 +21,9 @@ Steps (--do; all of them, in this order, if none is given):
 Errors: `mean` is that of the mean luminance of the whole picture; `rms` and `worst` are of means of blocks of 16x16 pixels that the
 cloud covers by half or more; relMSE is the mean over pixels and channels of (picture - reference)^2 / (reference^2 + 0.01). Squared
 errors are products of the differences to two halves of the reference with other seeds, whose noise is independent, so that it cancels in
-the mean. `noise` is the root mean square of the standard error of a block of the reference. Bright blocks have at least a tenth of the
-light of the brightest. Where a picture is itself made of parts, it is
-compared with the other parts.
+the mean. `noise` is the root mean square of the standard error of a block of the reference, which the differences of the halves in its
+pixels tell; behind `worst` stands that of the worst block. Bright blocks have at least a tenth of the light of the brightest. Where a
+picture is itself made of parts, it is compared with the other parts.
 
 How accurate the light is, in two tables, with references that are in FOLDER; make them once by --do trace:
     reference.py build/bin/nephele FOLDER --what angle depth --do march report

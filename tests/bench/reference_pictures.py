@@ -68,35 +68,37 @@ class Reference:
         brightest = max(self.whole.blocks[i] for i in self.covered)
         self.bright = [i for i in self.covered if self.whole.blocks[i] >= 0.1 * brightest]
 
+        # The standard error of a block, relative, by what the halves differ by in its pixels.
+        squares = Picture.block_means([(x - y)**2 for x, y in zip(self.first.luminance, self.second.luminance)])
+        self.noise_of = [self.share * math.sqrt(s) / BLOCK / max(m, 1e-30) for s, m in zip(squares, self.whole.blocks)]
+
     def noise(self, blocks):
         """Root mean square of the relative standard error of a block."""
-        a, b, whole = self.first.blocks, self.second.blocks, self.whole.blocks
-        return self.share * math.sqrt(sum(((a[i] - b[i]) / whole[i])**2 for i in blocks) / len(blocks))
+        return math.sqrt(sum(self.noise_of[i]**2 for i in blocks) / len(blocks))
 
     def errors(self, picture):
         """Of another picture; reference.py says what they are."""
         whole = self.whole
-        (rms, worst), (bright_rms, bright_worst) = (self.of_blocks(picture, blocks) for blocks in (self.covered, self.bright))
+        found = {"mean": picture.mean / whole.mean - 1}
+        for prefix, blocks in (("", self.covered), ("bright_", self.bright)):
+            m, r, a, b = picture.blocks, whole.blocks, self.first.blocks, self.second.blocks
+            squares = sum((m[i] - a[i]) * (m[i] - b[i]) / r[i]**2 for i in blocks) / len(blocks)
+            worst = max(blocks, key=lambda i: abs(m[i] / r[i] - 1))
+            found |= {prefix + "rms": math.sqrt(max(squares, 0)), prefix + "worst": m[worst] / r[worst] - 1,
+                      prefix + "noise": self.noise_of[worst]}
         relative = count = 0
         for planes in zip(picture.planes[:3], whole.planes, self.first.planes, self.second.planes):
             relative += sum((m - a) * (m - b) / (r * r + 0.01) for m, r, a, b in zip(*planes))
             count += len(planes[0])
-        return {"mean": picture.mean / whole.mean - 1, "rms": rms, "worst": worst, "bright_rms": bright_rms,
-                "bright_worst": bright_worst, "relmse": max(relative / count, 0)}
-
-    def of_blocks(self, picture, blocks):
-        """rms and worst."""
-        m, r, a, b = picture.blocks, self.whole.blocks, self.first.blocks, self.second.blocks
-        squares = sum((m[i] - a[i]) * (m[i] - b[i]) / r[i]**2 for i in blocks) / len(blocks)
-        return math.sqrt(max(squares, 0)), max((m[i] / r[i] - 1 for i in blocks), key=abs)
+        return found | {"relmse": max(relative / count, 0)}
 
     def own_errors(self):
-        """Those of the whole reference, from the difference of its halves."""
+        """Standard errors of the whole reference, from the difference of its halves."""
         a, b, whole = self.first, self.second, self.whole
         relative = sum((x - y)**2 / (r * r + 0.01) for c in range(3) for x, y, r in zip(a.planes[c], b.planes[c], whole.planes[c]))
-        worst = lambda blocks: max((self.share * (a.blocks[i] - b.blocks[i]) / whole.blocks[i] for i in blocks), key=abs)
-        return {"mean": self.share * (a.mean - b.mean) / whole.mean, "rms": self.noise(self.covered), "worst": worst(self.covered),
-                "bright_rms": self.noise(self.bright), "bright_worst": worst(self.bright),
+        squares = sum((x - y)**2 for x, y in zip(a.luminance, b.luminance))
+        return {"mean": self.share * math.sqrt(squares) / len(a.luminance) / whole.mean, "rms": self.noise(self.covered),
+                "worst": max(self.noise_of[i] for i in self.covered), "noise": 0,
                 "relmse": self.share**2 * relative / (3 * len(whole.luminance))}
 
 

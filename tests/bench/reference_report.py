@@ -65,7 +65,8 @@ def size(rms):
 
 
 def cells(errors):
-    return f"{percent(errors['mean'])} / {size(errors['rms'])} / {percent(errors['worst'])} | {errors['relmse']:.2g}"
+    noise = f" ± {100 * errors['noise']:.1f}" if errors["noise"] else ""
+    return f"{percent(errors['mean'])} / {size(errors['rms'])} / {percent(errors['worst'])}{noise} | {errors['relmse']:.2g}"
 
 
 def cloud_table(by_sun):
@@ -82,13 +83,15 @@ def cloud_table(by_sun):
 
 
 def angle_table(options, found):
-    lines = ["| mean cosine | sun | mean | rms of blocks | worst block | noise | rms of bright blocks | worst | noise |", "|---" * 9 + "|"]
+    lines = ["| mean cosine | sun | mean, % | rms | worst | noise | rms of bright blocks | worst | noise |", "|---" * 9 + "|"]
     for scene in found:
         reference = Reference(parts_of(options, scene)[0])
         e = reference.errors(Picture.read(inside(options, f"march/{scene.name}_good.exr")))
-        lines.append(f"| {scene.name.split('_')[1]} | {scene.sun} | {percent(e['mean'])} % | {size(e['rms'])} % | "
-                     f"{percent(e['worst'])} % | {100 * reference.noise(reference.covered):.1f} % | {size(e['bright_rms'])} % | "
-                     f"{percent(e['bright_worst'])} % | {100 * reference.noise(reference.bright):.1f} % |")
+        cells = [scene.name.split("_")[1], scene.sun, percent(e["mean"])]
+        for prefix, blocks in (("", reference.covered), ("bright_", reference.bright)):
+            cells += [size(e[prefix + "rms"]), f"{percent(e[prefix + 'worst'])} ± {100 * e[prefix + 'noise']:.1f}",
+                      f"{100 * reference.noise(blocks):.1f}"]
+        lines.append("| " + " | ".join(cells) + " |")
     return lines
 
 
