@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kCoarsest = 24;
 // What is missing need not be known well.
-constexpr int kSweepsOfError = 2, kSweepsOfCoarsest = 40;
+constexpr int kSweepsOfError = 4, kSweepsOfCoarsest = 40;
 constexpr float kToleranceOfError = 0.1f;
 // Sweeps of coarser lattices cost little, and what they leave would have to be mended on finer ones.
 constexpr float kTightened = 0.1f;
