@@ -14,8 +14,9 @@
 // Source: discrete ordinates and short characteristics are textbook transport (Lewis and Miller,
 // "Computational Methods of Neutron Transport", 1984).
 //
-// Limits: light spreads by half a cell per slice, so that of a core lit from one side only too much reaches
-// the dark side, where a cell is deep. Details smaller than a cell are lit as the cell is.
+// Limits: light spreads by half a cell per slice, and though half of that is taken back by what two lattices
+// differ by, a little too much reaches the dark side of a core that is lit from one side only. Details smaller
+// than a cell are lit as the cell is; what is thin even among thinned cells gives back less than it takes.
 #include "nephele/render/light/scattered_light.h"
 
 #include <fmt/format.h>
