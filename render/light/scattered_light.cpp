@@ -15,8 +15,9 @@
 // "Computational Methods of Neutron Transport", 1984).
 //
 // Limits: light spreads by half a cell per slice, and though half of that is taken back by what two lattices
-// differ by, a little too much reaches the dark side of a core that is lit from one side only. Details smaller
-// than a cell are lit as the cell is; what is thin even among thinned cells gives back less than it takes.
+// differ by, a little too much reaches the dark side of a core that is lit from one side only. Details
+// smaller than a cell are lit as the cell is; what is thin even among thinned cells gives back less than it
+// takes.
 #include "nephele/render/light/scattered_light.h"
 
 #include <fmt/format.h>

@@ -19,22 +19,34 @@ namespace nephele {
 
 namespace {
 
-// Nothing behind this share of the light is looked for, and steps grow this often, after so many of them.
-constexpr float kCutoff = 1e-2f;
+// Light that this share of what a node sends is behind is not looked for, nor is it behind a tenth of L.
+// Steps grow this often, after so many of them.
+constexpr float kCutoff = 1e-2f, kLargestCutoff = 0.1f;
 constexpr int kStepsOfALength = 4, kLongestStep = 4;
+
+// What light meets at a place.
+struct Met {
+  float density, source;
+
+  Met operator+(const Met& b) const { return {density + b.density, source + b.source}; }
+  Met operator-(const Met& b) const { return {density - b.density, source - b.source}; }
+  Met operator*(float x) const { return {density * x, source * x}; }
+};
 
 // Light that goes along a line, near to far: sources are linear in depth between two places.
 struct LineOfSight {
-  float sum = 0, through = 1, density, source;
+  Met met;
+  float sum = 0, through = 1;
 
-  void step(float length, float depthPerDensity, float nextDensity, float nextSource) {
-    const float depth = std::min(0.5f * length * depthPerDensity * (density + nextDensity), 80.0f),
+  void step(float length, float depthPerDensity, Met next) {
+    // Far from density nothing is known of the source.
+    if (!(next.density > 0)) next.source = met.source;
+    const float depth = std::min(0.5f * length * depthPerDensity * (met.density + next.density), 80.0f),
                 left = detail::expOfMinus(depth);
     const float mean = depth < 0.03f ? 1 - depth * (0.5f - depth * (1.0f / 6)) : (1 - left) / depth;
-    sum += through * (source * (1 - mean) + nextSource * (mean - left));
+    sum += through * (met.source * (1 - mean) + next.source * (mean - left));
     through *= left;
-    density = nextDensity;
-    source = nextSource;
+    met = next;
   }
 };
 
@@ -52,8 +64,9 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
     return far > 0 ? way * (1 / far) : Vec3f{0, 0, 1};
   };
   const float ofBeam = share_ < 1 ? (1 - smoothShare_) / (1 - share_) : 0.0f;
-  // Of what L is made of, and without the beam.
-  std::vector<float> source(cells), own(cells);
+  // What L is made of, and without the beam.
+  std::vector<Met> met(cells);
+  std::vector<float> own(cells);
   float beamWay[detail::kMostMoments] = {};
   if (towards_) detail::harmonics(-*towards_, degree, beamWay);
   rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f& node) {
@@ -70,24 +83,22 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
       }
     }
     own[i] = all - beam * beam_[i];
-    source[i] = own[i] + ofBeam * beam * beam_[i];
+    met[i] = {density_[i], own[i] + ofBeam * beam * beam_[i]};
   });
   std::vector<float> sent(cells);
+  const float cutoff = std::min(kCutoff / std::max(1 - share_, kCutoff), kLargestCutoff);
   rows_->forEachCell([&](std::size_t i, std::size_t, const Vec3f& node) {
     const Vec3f way = away(node);
-    LineOfSight line{0, 1, density_[i], source[i]};
+    LineOfSight line{met[i]};
     float at = 0;
-    for (int step = 0; line.through > kCutoff; ++step) {
+    for (int step = 0; line.through > cutoff; ++step) {
       const float length = float(std::min(1 << step / kStepsOfALength, kLongestStep));
       at += length;
       const Vec3f p = node + way * at;
       if (!(p.x > -1 && p.y > -1 && p.z > -1 && p.x < float(size_.x) && p.y < float(size_.y) &&
             p.z < float(size_.z)))
         break;
-      const detail::LatticePoint there(size_, p);
-      // Far from density nothing is known of the source.
-      const float density = there.of(density_.data());
-      line.step(length, depthPerDensity_, density, density > 0 ? there.of(source.data()) : line.source);
+      line.step(length, depthPerDensity_, detail::LatticePoint(size_, p).of(met.data()));
     }
     float sky = 0;
     if (sky_[0] != 0) {

@@ -23,11 +23,12 @@ struct LatticePoint {
     }
   }
   /// Between the values of the nodes.
-  float of(const float* values) const {
-    const float* at = values + first;
-    const auto edge = [&](std::size_t n) { return at[n] + share.x * (at[n + steps[0]] - at[n]); };
-    const auto face = [&](std::size_t n) { return edge(n) + share.y * (edge(n + steps[1]) - edge(n)); };
-    return face(0) + share.z * (face(steps[2]) - face(0));
+  template <class Value>
+  Value of(const Value* values) const {
+    const Value* at = values + first;
+    const auto edge = [&](std::size_t n) { return at[n] + (at[n + steps[0]] - at[n]) * share.x; };
+    const auto face = [&](std::size_t n) { return edge(n) + (edge(n + steps[1]) - edge(n)) * share.y; };
+    return face(0) + (face(steps[2]) - face(0)) * share.z;
   }
 };
 
