@@ -87,15 +87,15 @@ Description volumeDescription(const std::string& path) {
 
 }  // namespace
 
-Description describeFile(const std::string& path, bool alwaysCountPairs) {
+Description describeFile(const std::string& path, const DescriptionOptions& options) {
   const std::string extension = CLI::detail::to_lower(std::filesystem::path(path).extension().string());
   Description description;
   if (isVolumeFile(path))
     description = volumeDescription(path);
   else if (extension == ".exr" || extension == ".png" || extension == ".hdr")
-    description = {{"kind", "image"}, {"content", describeImage(path)}};
+    description = {{"kind", "image"}, {"content", describeImage(path, options.mostBytes)}};
   else
-    description = meshDescription(path, alwaysCountPairs);
+    description = meshDescription(path, options.alwaysCountPairs);
   // Names inside files may be in any encoding, but JSON is UTF-8.
   return Description::parse(description.dump(-1, ' ', false, Description::error_handler_t::replace));
 }

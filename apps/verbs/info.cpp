@@ -47,7 +47,7 @@ void describeFiles(const InfoOptions& options, Run& run) {
     run.begin("describe");
     Description description;
     try {
-      description = describeFile(path, options.selfIntersections);
+      description = describeFile(path, {options.selfIntersections, run.memoryLimitBytes});
       print(run, "", path, description);
     } catch (const Cancelled&) {
       throw;

@@ -55,7 +55,9 @@ Image readLinearImage(const std::string& path, ColourEncoding encoding = ColourE
 
 /// What is in an image file, as lines for a person: size, channels with types and ranges, layers, attributes;
 /// of deep OpenEXR files of scan lines also the number of samples. Reads every pixel.
-/// @throws Error as readImage does.
-std::vector<std::string> describeImage(const std::string& path);
+/// @throws Error as readImage does; also if more than `mostBytes` of pixels would have to be held at once, as
+/// of interlaced PNG files.
+std::vector<std::string> describeImage(const std::string& path,
+                                       double mostBytes = std::numeric_limits<double>::infinity());
 
 }  // namespace nephele

@@ -122,7 +122,7 @@ Image readLinearImage(const std::string& path, ColourEncoding encoding, double m
   return image;
 }
 
-std::vector<std::string> describeImage(const std::string& path) {
+std::vector<std::string> describeImage(const std::string& path, double mostBytes) {
   struct Range {
     float low = INFINITY, high = -INFINITY;
     std::size_t notFinite = 0;
@@ -157,7 +157,8 @@ std::vector<std::string> describeImage(const std::string& path) {
                       }
                       for (std::size_t c = 0; c != channels.size(); ++c)
                         for (const float value : channels[c]) add(ranges[c], value);
-                    }});
+                    },
+                    mostBytes});
   const std::size_t count = header.channels.size();
   std::vector<std::string> lines{fmt::format("{}image {} x {}, {} channel{}, {}", isDeep ? "deep " : "",
                                              header.width, header.height, count, count == 1 ? "" : "s",

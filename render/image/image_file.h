@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -40,6 +41,8 @@ struct ImageReader {
   /// after pixel. Without it deep images are refused.
   std::function<void(std::span<const unsigned> counts, std::span<const std::vector<float>> channels)>
       deepRow{};
+  /// What a reader may hold of pixels that are there only after the last of them, as in interlaced files.
+  double mostBytes = std::numeric_limits<double>::infinity();
 };
 
 /// Each reads a whole file. @throws Error naming the path and what is wrong.

@@ -185,6 +185,10 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
 
     const std::size_t rowBytes = png_get_rowbytes(png.png, png.info);
     // An interlaced file is whole only after its last pass.
+    const double held = double(rowBytes) * header.height;
+    require(!interlaced || held <= reader.mostBytes,
+            fmt::format("is interlaced: its pixels need {:.0f} MB of memory, and {:.0f} MB is the limit",
+                        held / 1e6, reader.mostBytes / 1e6));
     std::vector<std::uint8_t> bytes(rowBytes * (interlaced ? std::size_t(header.height) : 1));
     if (interlaced) {
       std::vector<png_bytep> rows;

@@ -90,7 +90,7 @@ void useMesh(const Input& input) {
   requireValid(mesh);
   diagnose(mesh);
   if (mesh.corners.size() > kMostCorners) return;
-  succeeds(input.path, [&] { apps::describeFile(input.path, false); });
+  succeeds(input.path, [&] { apps::describeFile(input.path); });
   writeAndReadBack(mesh, input.hash);
   runVerbs(input);
 }

@@ -58,10 +58,19 @@ const ValueLayout* layoutOf(const openvdb::GridBase& grid) {
   return nullptr;
 }
 
+// Texts that people wrote are far shorter; OpenVDB holds each twice while it reads.
+constexpr std::int64_t kLongestText = std::int64_t{64} << 20;
+
+void requireTextSize(std::int64_t size) {
+  if (size > kLongestText)
+    throw Error(fmt::format("a text of {} bytes, where {} are the most", size, kLongestText));
+}
+
 std::string takeText(FileBytes& bytes) {
   const std::int64_t size = bytes.take<std::uint32_t>();
   if (size > bytes.left())
     throw Error(fmt::format("damaged: a text of {} bytes, where {} are left", size, bytes.left()));
+  requireTextSize(size);
   std::string text(std::size_t(size), '\0');
   bytes.sgetn(text.data(), size);
   return text;
@@ -96,6 +105,8 @@ void followMetadata(FileBytes& bytes) {
         throw Error(fmt::format("damaged: metadata '{}' of type {} has {} bytes, not {}", name, type, size,
                                 expected));
     }
+    // What is longer than the file is found where it ends.
+    if (size <= bytes.left()) requireTextSize(size);
     bytes.skip(size);
   }
 }

@@ -100,6 +100,26 @@ TEST_F(VdbDamage, TextsThatTheFileCannotHoldAreRefused) {
             std::string::npos);
 }
 
+// A file may be as long as it says, and still hold nothing but a text. What follows is a hole of the file.
+TEST_F(VdbDamage, TextsOfHundredsOfMegabytesAreRefused) {
+  const std::string path = folder_.file("long.vdb");
+  constexpr std::uint32_t kSize = 300u << 20;
+  const std::size_t name = whole_.find("class") - 4;
+  // The value of `class`: after its name and its type, "string".
+  for (const std::size_t place : {name, whole_.find("class") + 5 + 4 + 6}) {
+    std::ofstream(path, std::ios::binary) << with(whole_, place, kSize);
+    std::filesystem::resize_file(path, kSize + whole_.size());
+    EXPECT_THROW(
+        try { readVdbFile(path); } catch (const Error& error) {
+          EXPECT_NE(std::string(error.what()).find("a text of 314572800 bytes, where 67108864 are the most"),
+                    std::string::npos)
+              << error.what();
+          throw;
+        },
+        Error);
+  }
+}
+
 TEST_F(VdbDamage, MetadataOfTheWrongSizeIsRefused) {
   const std::size_t value = whole_.find("file_voxel_count") + std::strlen("file_voxel_count") + 4 + 5;
   ASSERT_EQ(at<std::uint32_t>(value), 8u);

@@ -83,6 +83,25 @@ TEST(ImageDamage, PixelsBeyondTheLimitAreRefused) {
   EXPECT_THROW(readImage(path, 4 * 5 * 4 * 4 - 1), Error);
 }
 
+// Three bytes a pixel, which 30 000 packed ones can hold; a row at a time is not held.
+TEST(ImageDamage, InterlacedPixelsBeyondTheLimitAreNotDescribed) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.png");
+  const std::string pixels = bigEndian(30000) + "IDAT" + std::string(30004, '\0');
+  const auto messageFor = [&](bool interlaced) -> std::string {
+    write(path, pngHeader(3000, 3000, interlaced) + pixels);
+    try {
+      describeImage(path, 20e6);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_EQ(messageFor(true),
+            path + ": is interlaced: its pixels need 27 MB of memory, and 20 MB is the limit");
+  EXPECT_NE(messageFor(false).find("is damaged: "), std::string::npos) << "the pixels are none";
+}
+
 // By hand of the matrix from the primaries of Radiance, in Lindbloom's way: white is white, and of X, Y, Z =
 // the chromaticity of a primary over its y nothing but that primary is left.
 TEST(ImageDamage, RadianceInXyzBecomesRedGreenAndBlue) {
