@@ -13,6 +13,7 @@
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
 #include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -145,10 +146,10 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
     openvdb::GridBase::Ptr copy = grid.impl().grid->copyGrid();
     // Their values were not read and would be lost.
     require(detail::isCheckable(*copy), fmt::format("{}: the grid '{}' of {} cannot be written", path,
-                                                    copy->getName(), copy->valueType()));
+                                                    printable(copy->getName()), copy->valueType()));
     for (const auto& other : labelled)
       require(other->getName() != copy->getName(),
-              fmt::format("{}: two grids are called '{}'", path, copy->getName()));
+              fmt::format("{}: two grids are called '{}'", path, printable(copy->getName())));
     for (const auto& [key, value] : metadata) {
       require(!key.empty(), path + ": metadata needs names");
       copy->removeMeta(key);
