@@ -62,8 +62,8 @@ void check(const Scattering& scattering, const ScatteredLight::Options& options)
 ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards) {
   ScatteredSource source;
   source.irradiance = [](const Vec3f&) { return 1.0f; };
-  source.columns = [&sun](std::span<const Vec3f> world, std::span<float> columns) {
-    sun.columnDensities(world, columns);
+  source.columns = [&sun](std::span<const Vec3f> world, std::span<float> found) {
+    sun.columnDensities(world, found);
   };
   source.towards = towards;
   return source;
