@@ -283,6 +283,11 @@ void addShadowOutput(CLI::App& app, LightOptions& options) {
                       "Writes the deep shadow map of a light; without a name, of the only one."));
 }
 
+bool LightOptions::readsCodes() const {
+  return lights.locals.empty() && lights.shadowDetail == 1 && !deepShadows && readShadows.empty() &&
+         writtenShadows.empty();
+}
+
 Lights LightOptions::resolved(double mostBytes) const {
   Lights result = lights;
   if (noSun) result.suns.clear();

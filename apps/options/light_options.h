@@ -38,6 +38,8 @@ struct LightOptions {
   /// The lights of the picture; one sun where no light is given but a sky of one colour. Reads the sky's map.
   /// @throws Error if a name is unknown or taken twice, or a file cannot be read.
   Lights resolved(double mostBytes) const;
+  /// Whether a density that is coded is enough for them all.
+  bool readsCodes() const;
   /// Writes the deep shadow maps that are asked for. @throws Error naming the light or the file.
   void writeShadows(const RenderVolume& volume, const Lights& resolved, const Medium& medium,
                     const Run& run) const;

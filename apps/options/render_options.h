@@ -47,6 +47,8 @@ struct PictureOptions : CameraOptions {
   PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
   /// Whether a still reads the samples of the volume's grid after its light has been made.
   bool needsSamples() const;
+  /// Whether a density that is coded is enough for all of it.
+  bool readsCodes() const { return !needsSamples() && light.readsCodes(); }
   /// `render` with the rays per pixel that suit `camera`, unless they were given.
   RenderOptions marched(const Camera& camera) const;
   /// `path`, with what both integrators have in common.

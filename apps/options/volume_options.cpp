@@ -12,7 +12,8 @@
 namespace nephele::apps {
 namespace {
 
-std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::string& grid, Run& run) {
+std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::string& grid, Run& run,
+                                         const BrickSink& made = {}) {
   const VdbGrid vdb = readScalarGrid(path, grid);
   const VdbGridInfo info = describe(vdb);
   if (info.gridClass == VdbGridInfo::Class::levelSet)
@@ -23,7 +24,7 @@ std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::str
   run.requireMemory(
       25.0 * double(info.activeVoxels) + (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 6,
       "make the volume with larger voxels");
-  return toBricks(vdb);
+  return toBricks(vdb, made);
 }
 
 VolumePart::Grids readThree(const std::string& path, const std::string& grid, double scale = 1) {
@@ -56,24 +57,31 @@ T entryOf(const std::vector<T>& list, std::size_t index, const T& standard) {
 }
 
 VolumePart readPart(const std::string& path, std::size_t index, const VolumeOptions& options,
-                    const Shutter& shutter, Run& run) {
+                    const VolumeReading& reading, Run& run) {
   const auto nameIn = [&](const std::vector<std::string>& names) {
     const std::string name = entryOf(names, index, std::string());
     return name == "none" ? std::string() : name;
   };
   VolumePart part;
-  part.density = readFog(path, nameIn(options.densityGrids), run);
+  part.share = float(entryOf(options.densityScales, index, 1.0));
+  BrickSink made;
+  if (reading.coded && part.share == 1 && !options.hasOthers()) {
+    part.coded = std::make_shared<CodedDensity>();
+    made = [coded = part.coded](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
+      coded->take(grid, begin, end);
+    };
+  }
+  part.density = readFog(path, nameIn(options.densityGrids), run, made);
   if (const std::string name = nameIn(options.colourGrids); !name.empty())
     part.colour = readThree(path, name);
   if (const std::string name = nameIn(options.emissionGrids); !name.empty())
     part.emission = readGlow(path, name, run);
   if (const std::string name = nameIn(options.temperatureGrids); !name.empty())
     part.temperature = readFog(path, name, run);
-  if (const std::string name = nameIn(options.velocityGrids); !name.empty() && !shutter.isInstant()) {
+  if (const std::string name = nameIn(options.velocityGrids); !name.empty() && !reading.shutter.isInstant()) {
     part.velocity = readThree(path, name, options.velocityScale);
-    part.shutter = shutter;
+    part.shutter = reading.shutter;
   }
-  part.share = float(entryOf(options.densityScales, index, 1.0));
   part.emissionScale = float(options.emissionScale);
   part.temperatureScale = float(options.temperatureScale);
   return part;
@@ -126,19 +134,21 @@ void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
 }
 
 RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
-                         const Shutter& shutter, Run& run) {
+                         const VolumeReading& reading, Run& run) {
   checkCount("--grid", options.densityGrids.size(), paths.size());
   checkCount("--color-grid", options.colourGrids.size(), paths.size());
   checkCount("--emission-grid", options.emissionGrids.size(), paths.size());
   checkCount("--temperature-grid", options.temperatureGrids.size(), paths.size());
   checkCount("--velocity-grid", options.velocityGrids.size(), paths.size());
   checkCount("--density-scale", options.densityScales.size(), paths.size());
-  if (!options.velocityGrids.empty() && shutter.isInstant())
+  if (!options.velocityGrids.empty() && reading.shutter.isInstant())
     throw CLI::ValidationError("--velocity-grid", "shows only while the shutter is open; give --shutter");
   run.begin("read");
+  VolumeReading each = reading;
+  each.coded = reading.coded && paths.size() == 1;
   std::vector<VolumePart> parts;
   for (std::size_t i = 0; i != paths.size(); ++i)
-    namingFile(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, shutter, run))); });
+    namingFile(paths[i], [&] { check(parts.emplace_back(readPart(paths[i], i, options, each, run))); });
   // Trees of files are many small parts.
   detail::releaseFreed();
   run.requireMemory(estimateCombinedBytes(parts), "make the volumes with larger voxels");

@@ -18,14 +18,28 @@ struct VolumeOptions {
   double emissionScale = 1, temperatureScale = 2000;
   /// Frames per unit of time.
   double velocityScale = 1.0 / 24;
+
+  /// Whether anything but densities is looked at.
+  bool hasOthers() const {
+    return !(colourGrids.empty() && emissionGrids.empty() && temperatureGrids.empty() &&
+             velocityGrids.empty());
+  }
 };
 
 /// Declares the options on `app`.
 void addVolumeOptions(CLI::App& app, VolumeOptions& options);
 
-/// Reads the volumes of `paths` as they are marched, all as one, blurred while `shutter` is open.
+/// How volumes are read.
+struct VolumeReading {
+  /// Motion blurs them while it is open.
+  Shutter shutter;
+  /// Codes a density that stands alone while it is read, see CodedDensity.
+  bool coded = false;
+};
+
+/// Reads the volumes of `paths` as they are marched, all as one.
 /// @throws Error naming the path if a grid is missing, a level set, or larger than the memory allowed.
 RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
-                         const Shutter& shutter, Run& run);
+                         const VolumeReading& reading, Run& run);
 
 }  // namespace nephele::apps

@@ -63,7 +63,7 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
   const RenderVolume volume =
-      readVolumes({options.input}, options.picture.volumes, options.picture.shutter, run);
+      readVolumes({options.input}, options.picture.volumes, {options.picture.shutter}, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
   PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   options.objects.addTo(picture, volume, run.memoryLimitBytes);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,10 @@ class BrickGrid : public BrickLayout {
 
   detail::UnsetVector<float> values_;
 };
+
+/// Told of the bricks begin .. end - 1 of a grid when they are made, each once and in their order; it may
+/// give back their samples. The pool is complete then, the table is not.
+using BrickSink = std::function<void(BrickGrid& grid, std::int32_t begin, std::int32_t end)>;
 
 /// Copies the shared border samples of all bricks from their neighbours' own samples and recomputes the
 /// ranges. Call after writing the 8^3 own samples of pool bricks that each stand at one position. Shared

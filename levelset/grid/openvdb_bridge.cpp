@@ -275,14 +275,14 @@ openvdb::math::Transform::Ptr transformOf(const Lattice& lattice, double voxelSi
   return openvdb::math::Transform::createLinearTransform(matrix);
 }
 
-std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign) {
+std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign, const BrickSink& made) {
   const std::string name = displayName(grid);
   BlockTable blocks = blocksOf(grid, name);
   blocks.sign = sign;
   const Lattice lattice = latticeOf(grid);
   if (const BrickBox& box = blocks.codes.box; box.size() > 0)
     requireResolvedVoxels(grid, box.first * kBrick, (box.first + box.count) * kBrick);
-  return gatherBricks(blocks, lattice, Beside::varying, name);
+  return gatherBricks(blocks, lattice, Beside::varying, name, made);
 }
 
 VoxelGrid<float> voxelsOf(const openvdb::FloatGrid& grid, double voxelSize, const Vec3i& origin, float sign) {

@@ -39,7 +39,7 @@ openvdb::math::Transform::Ptr transformOf(const Lattice& lattice, double voxelSi
 /// The bricks of a grid, its values times `sign`: -1 for a level set, which is negative inside in OpenVDB.
 /// @throws Error naming the grid if it is too large, not finite, or so far from the origin that single
 /// precision would move a voxel by more than an eighth of its size.
-std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign);
+std::shared_ptr<BrickGrid> bricksOf(const openvdb::FloatGrid& grid, float sign, const BrickSink& made = {});
 /// The leaves and tiles of a tree, likewise, its first brick being that at `origin` and its voxels of
 /// `voxelSize`.
 VoxelGrid<float> voxelsOf(const openvdb::FloatGrid& grid, double voxelSize, const Vec3i& origin, float sign);

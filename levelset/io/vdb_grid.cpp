@@ -128,9 +128,9 @@ openvdb::FloatGrid::ConstPtr floatGrid(const VdbGrid& grid) {
 
 }  // namespace detail
 
-std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid) {
+std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid, const BrickSink& made) {
   const openvdb::FloatGrid::ConstPtr source = detail::floatGrid(grid);
-  return detail::bricksOf(*source, signOf(*source));
+  return detail::bricksOf(*source, signOf(*source), made);
 }
 
 VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label) {

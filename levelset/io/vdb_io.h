@@ -83,10 +83,11 @@ std::string listOf(const std::vector<VdbGrid>& grids);
 /// Around the active voxels of a grid, world units; empty if there are none.
 Box activeBox(const VdbGrid& grid);
 
-/// Bricks of a scalar grid. A level set changes sign (positive inside); fog keeps its values.
+/// Bricks of a scalar grid, `made` being told of them. A level set changes sign (positive inside); fog keeps
+/// its values.
 /// @throws Error naming the grid if it holds no scalars, is too large, not finite, or so far from the origin
 /// that single precision would move a voxel by more than an eighth of its size.
-std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid);
+std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid, const BrickSink& made = {});
 
 /// What a file says of a grid beside its values.
 struct VdbGridLabel {

@@ -53,6 +53,8 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
 
   // Samples that are to be given back are, before the light takes its memory.
   if (readsCodes()) volume.coded();
+  require(volume.hasSamples() || readsCodes(),
+          "light: the samples of the density were given back, which this light needs");
   const auto toShade = [surfaces](const Ray& ray) { return surfaces->distanceToShade(ray); };
   std::optional<RenderVolume> finer;
   if (lights.shadowDetail > 1 && (!distant.empty() || !lights.locals.empty()))
@@ -89,8 +91,7 @@ bool BakedLight::readsCodes() const {
   const bool hasDeep = lights.deepTolerance || std::ranges::any_of(lights.suns, [](const DistantLight& sun) {
                          return bool(sun.deepShadow);
                        });
-  return lights.locals.empty() && !hasDeep && lights.shadowDetail <= 1 && !source->hasEmission() &&
-         ScatteredLight::readsCodes(*source, solverOptions());
+  return lights.locals.empty() && !hasDeep && lights.shadowDetail <= 1 && !source->hasEmission();
 }
 
 // Last, when the floats have been read and what the light needed while it was made is given back.

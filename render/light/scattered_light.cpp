@@ -204,10 +204,6 @@ float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options&
           detail::LatticePlacement(volume, options.longestSide).voxelsPerCell() * volume.typicalDensity());
 }
 
-bool ScatteredLight::readsCodes(const RenderVolume& volume, const Options& options) {
-  return !volume.isEmpty() && detail::readsOwnNodes(detail::LatticePlacement(volume, options.longestSide));
-}
-
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
   const detail::LatticePlacement place(volume, options.longestSide);

@@ -104,10 +104,6 @@ class ScatteredLight {
   /// Cells are never thinned so far that density 1 has less extinction than this.
   static float leastExtinction(const RenderVolume& volume, const Options& options);
 
-  /// Whether it is the same for a volume that holds its density coded only: where cells are not much wider
-  /// than voxels, samples of more than a brick's own nodes are needed.
-  static bool readsCodes(const RenderVolume& volume, const Options& options);
-
   /// Bytes held while it is made, and afterwards.
   struct Bytes {
     double working = 0, kept = 0;

@@ -131,9 +131,9 @@ CodedBricks::CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::
   setTable(table);
 }
 
-void CodedBricks::set(std::int32_t pool, const float* nodes) {
-  units_[std::size_t(pool)] =
-      HWY_DYNAMIC_DISPATCH(codeBrick)(nodes, kWidth, kPlane, codes_.get() + std::size_t(pool) * kNodes);
+void CodedBricks::set(std::int32_t pool, const float* nodes, int row) {
+  units_[std::size_t(pool)] = HWY_DYNAMIC_DISPATCH(codeBrick)(nodes, std::size_t(row), std::size_t(row * row),
+                                                              codes_.get() + std::size_t(pool) * kNodes);
 }
 
 void CodedBricks::setTable(std::span<const std::int32_t> table) {

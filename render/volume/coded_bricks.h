@@ -48,8 +48,9 @@ class CodedBricks {
   /// The same of kNodes for every pool brick, whose memory is given back meanwhile.
   CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table);
 
-  /// Codes kNodes numbers, side by side. From several threads for different bricks.
-  void set(std::int32_t pool, const float* nodes);
+  /// Codes kWidth^3 numbers, of which rows begin `row` and planes row^2 apart. From several threads for
+  /// different bricks.
+  void set(std::int32_t pool, const float* nodes, int row = kWidth);
   /// Lets bricks stand at places.
   void setTable(std::span<const std::int32_t> table);
 

@@ -30,6 +30,21 @@ constexpr std::uint8_t kFarthest = 32;
 
 RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour)
     : density_(std::move(density)), colour_(std::move(colour)) {
+  measure(nullptr);
+}
+
+RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, CodedDensity coded)
+    : density_(std::move(density)) {
+  measure(&coded);
+  std::call_once(made_->measuring, [&] { made_->typicalDensity = typicalDensityOf(&coded); });
+  std::call_once(made_->coding, [&] {
+    made_->coded = coded.codes(*density_);
+    made_->isGivenUp = true;
+  });
+}
+
+// From what is known of samples that were coded, or from the samples.
+void RenderVolume::measure(const CodedDensity* coded) {
   require(density_ != nullptr, "render volume: no density given");
   const BrickGrid& grid = *density_;
   require(grid.background() == 0.0f,
@@ -55,7 +70,7 @@ RenderVolume::RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColou
   if (isEmpty()) return;
   measureEmptiness();
   measureUniformity();
-  measureBounds();
+  measureBounds(coded);
   const Vec3f reach =
       max(max(worldBounds().max, -worldBounds().max), max(worldBounds().min, -worldBounds().min));
   const float farthest = std::max({reach.x, reach.y, reach.z});
@@ -158,7 +173,7 @@ void RenderVolume::measureUniformity() {
   detail::spreadDistances(uniformity_, grid.brickCount());
 }
 
-void RenderVolume::measureBounds() {
+void RenderVolume::measureBounds(const CodedDensity* coded) {
   const BrickGrid& grid = *density_;
   constexpr int brickSize = BrickGrid::kBrick;
   Vec3i low = occupied_.front(), high = occupied_.front();
@@ -183,19 +198,15 @@ void RenderVolume::measureBounds() {
   std::vector<Box> boxes(border.size());
   parallelFor(border.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const float* values = grid.brick(grid.poolIndex(border[i]));
-      const float* glows[3] = {};
-      for (std::size_t c = 0; c != 3 && hasEmission(); ++c)
-        glows[c] = colour_.emission[c]->brick(colour_.emission[c]->poolIndex(border[i]));
-      const float* const* glow = hasEmission() ? glows : nullptr;
       Box box;
-      for (int z = 0; z <= brickSize; ++z)
-        for (int y = 0; y <= brickSize; ++y)
-          for (int x = 0; x <= brickSize; ++x) {
-            const int at = ((z + 1) * BrickGrid::kWidth + y + 1) * BrickGrid::kWidth + x + 1;
-            if (values[at] > 0 || (glow && (glow[0][at] > 0 || glow[1][at] > 0 || glow[2][at] > 0)))
-              box = box.including(Vec3f(border[i] * brickSize + Vec3i{x, y, z}));
-          }
+      if (coded) {
+        const BrickMeasures& known = coded->measures()[std::size_t(grid.poolIndex(border[i]))];
+        for (const auto& node : {known.first, known.last})
+          if (known.last[0] >= 0)
+            box = box.including(Vec3f(border[i] * brickSize + Vec3i{node[0], node[1], node[2]}));
+      } else {
+        box = boxAbove0(border[i]);
+      }
       // Interpolation carries density to the voxel beyond.
       if (!box.isEmpty()) boxes[i] = box.expanded(1.0f);
     }
@@ -211,6 +222,24 @@ void RenderVolume::measureBounds() {
   }
 }
 
+// Around the nodes of a brick where anything is.
+Box RenderVolume::boxAbove0(const Vec3i& brick) const {
+  const float* values = density_->brick(density_->poolIndex(brick));
+  const float* glows[3] = {};
+  for (std::size_t c = 0; c != 3 && hasEmission(); ++c)
+    glows[c] = colour_.emission[c]->brick(colour_.emission[c]->poolIndex(brick));
+  const float* const* glow = hasEmission() ? glows : nullptr;
+  Box box;
+  for (int z = 0; z <= BrickGrid::kBrick; ++z)
+    for (int y = 0; y <= BrickGrid::kBrick; ++y)
+      for (int x = 0; x <= BrickGrid::kBrick; ++x) {
+        const int at = sampleOffset(x, y, z);
+        if (values[at] > 0 || (glow && (glow[0][at] > 0 || glow[1][at] > 0 || glow[2][at] > 0)))
+          box = box.including(Vec3f(brick * BrickGrid::kBrick + Vec3i{x, y, z}));
+      }
+  return box;
+}
+
 float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
   const Vec3d place(density_->worldToIndex()(world));
   const auto valueOf = [&](const BrickGrid& grid) { return std::max(sampleGrid(grid, place), 0.0f); };
@@ -219,42 +248,27 @@ float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
 }
 
 float RenderVolume::typicalDensity() const {
-  std::call_once(made_->measuring, [this] { made_->typicalDensity = measuredTypicalDensity(); });
+  std::call_once(made_->measuring, [this] { made_->typicalDensity = typicalDensityOf(nullptr); });
   return made_->typicalDensity;
 }
 
-float RenderVolume::measuredTypicalDensity() const {
-  struct Sums {
-    double density = 0, squares = 0;
-  };
-  std::vector<Sums> bricks(occupied_.size());
-  parallelFor(occupied_.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) {
-      const std::int32_t pool = density_->poolIndex(occupied_[i]);
-      if (const Interval& range = density_->ranges()[std::size_t(pool)]; range.isPoint()) {
-        constexpr double voxels = BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick;
-        const double value = std::max(range.max, 0.0f);
-        bricks[i] = {voxels * value, voxels * value * value};
-        continue;
-      }
-      const float* values = density_->brick(pool);
-      for (int z = 0; z != BrickGrid::kBrick; ++z)
-        for (int y = 0; y != BrickGrid::kBrick; ++y) {
-          float sum = 0, squares = 0;
-          for (int x = 0; x != BrickGrid::kBrick; ++x) {
-            const float value = std::max(values[sampleOffset(x, y, z)], 0.0f);
-            sum += value;
-            squares += value * value;
-          }
-          bricks[i].density += double(sum);
-          bricks[i].squares += double(squares);
-        }
-    }
-  });
+float RenderVolume::typicalDensityOf(const CodedDensity* coded) const {
+  std::vector<BrickMeasures> measures(density_->poolSize());
+  if (!coded)
+    parallelFor(measures.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pool = begin; pool != end; ++pool)
+        if (density_->ranges()[pool].max > 0)
+          measures[pool] = BrickMeasures::of(density_->brick(std::int32_t(pool)));
+    });
   // Added in a fixed order, so that the sum does not depend on the threads.
-  Sums total;
-  for (const Sums& brick : bricks) total = {total.density + brick.density, total.squares + brick.squares};
-  return total.density > 0 ? float(total.squares / total.density) : 0.0f;
+  double density = 0, squares = 0;
+  for (const Vec3i& brick : occupied_) {
+    const auto pool = std::size_t(density_->poolIndex(brick));
+    const BrickMeasures& own = coded ? coded->measures()[pool] : measures[pool];
+    density += own.density;
+    squares += own.squares;
+  }
+  return density > 0 ? float(squares / density) : 0.0f;
 }
 
 const CodedBricks& RenderVolume::coded() const {
@@ -283,7 +297,8 @@ std::size_t RenderVolume::memoryBytes() const {
   if (field_) others += field_->memoryBytes();
   const auto codedBytes =
       std::size_t(CodedBricks::estimateBytes(double(density_->poolSize()), double(density_->table().size())));
-  return density_->memoryBytes() + codedBytes + others + emptiness_.size() + uniformity_.size() +
+  const std::size_t given = hasSamples() ? 0 : density_->values().capacity() * sizeof(float);
+  return density_->memoryBytes() - given + codedBytes + others + emptiness_.size() + uniformity_.size() +
          occupied_.size() * sizeof(Vec3i) + outline_.size() * sizeof(Vec3f);
 }
 

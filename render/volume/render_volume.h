@@ -9,7 +9,7 @@
 
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/base/box.h"
-#include "nephele/render/volume/coded_bricks.h"
+#include "nephele/render/volume/coded_density.h"
 
 namespace nephele {
 
@@ -38,6 +38,10 @@ class RenderVolume {
   /// @throws Error if a background is not 0, a value is not finite, the bricks are too many to index (1.6
   /// million distinct ones, 8.5 GB), or colours are laid out in another way.
   explicit RenderVolume(std::shared_ptr<const BrickGrid> density, VolumeColour colour = {});
+
+  /// Of a grid all of whose samples were given to `coded`: as after giveUpSamples and `coded`. @throws Error
+  /// as above.
+  RenderVolume(std::shared_ptr<const BrickGrid> density, CodedDensity coded);
 
   /// A density that rays ask a field for; `density` stands for it wherever light is worked out beforehand.
   /// @throws Error if the grid is empty and the field is not, since then nothing would be lit; and as above.
@@ -101,12 +105,14 @@ class RenderVolume {
 
   void checkColour(const VolumeColour::Grids& grids, const char* name) const;
   void measureColour();
-  float measuredTypicalDensity() const;
+  float typicalDensityOf(const CodedDensity* coded) const;
   bool isOccupied(std::size_t entry) const;
   void findOccupied();
   void measureEmptiness();
   void measureUniformity();
-  void measureBounds();
+  void measureBounds(const CodedDensity* coded);
+  Box boxAbove0(const Vec3i& brick) const;
+  void measure(const CodedDensity* coded);
 
   std::shared_ptr<const BrickGrid> density_;
   VolumeColour colour_;

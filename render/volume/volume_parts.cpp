@@ -366,7 +366,10 @@ void check(const VolumePart& part) {
 RenderVolume combine(const std::vector<VolumePart>& parts, const Progress& progress) {
   require(!parts.empty(), "volumes: at least one is needed");
   for (const VolumePart& part : parts) check(part);
+  if (isPlain(parts) && parts[0].coded) return RenderVolume(parts[0].density, std::move(*parts[0].coded));
   if (isPlain(parts)) return RenderVolume(parts[0].density);
+  for (const VolumePart& part : parts)
+    require(!part.coded, "volumes: the samples of what is brought together were given back");
   return Combiner(parts).combined(progress);
 }
 

@@ -17,6 +17,9 @@ struct VolumePart {
 
   /// Values below zero count as zero. May be missing where there is something that glows.
   std::shared_ptr<const BrickGrid> density;
+  /// Where the samples of the density were given back while it was read; then it must be the only part, as it
+  /// is.
+  std::shared_ptr<CodedDensity> coded;
   /// Multiplies the density, >= 0: its extinction relative to that of the Medium.
   float share = 1.0f;
   /// Multiplies the medium's albedo, within [0, 1] per colour.

@@ -88,7 +88,7 @@ void requireFinite(const float* samples, int count, const std::string& name) {
 }
 
 std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice& lattice, Beside beside,
-                                        const std::string& name) {
+                                        const std::string& name, const BrickSink& made) {
   auto result =
       std::make_shared<BrickGrid>(lattice, blocks.codes.box, blocks.sign * blocks.constants.front());
 
@@ -115,7 +115,7 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
   result->reserve(pool);
   for (std::size_t c = 1; c < constants.size(); ++c) result->appendConstant(blocks.sign * constants[c]);
   result->appendUnset(rowStart[rowCount]);
-  parallelFor(rowCount, 4, [&](std::size_t begin, std::size_t end) {
+  const auto gatherRows = [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       if (rowStart[row + 1] == rowStart[row]) continue;
       auto next = std::int32_t(constants.size() + rowStart[row]);
@@ -129,7 +129,18 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
         result->setRange(entry, rangeOfBrick(samples));
       }
     }
-  });
+  };
+  if (made) made(*result, 0, std::int32_t(constants.size()));
+  constexpr std::uint32_t kTogether = 8192;
+  for (std::size_t first = 0, last = 0; first != rowCount; first = last) {
+    while (last != rowCount && (!made || last == first || rowStart[last + 1] - rowStart[first] <= kTogether))
+      ++last;
+    parallelFor(last - first, 4,
+                [&](std::size_t begin, std::size_t end) { gatherRows(first + begin, first + end); });
+    if (made)
+      made(*result, std::int32_t(constants.size() + rowStart[first]),
+           std::int32_t(constants.size() + rowStart[last]));
+  }
   result->setTable(std::move(table));
   return result;
 }

@@ -35,6 +35,35 @@ float meanTransmittance(float before, float depth) {
   return (expOfMinus(before - up) - expOfMinus(std::min(before + down, 80.0f))) / (up + down);
 }
 
+// Samples of a brick: of its node 0, and how many there are in a row.
+struct DecodedBrick {
+  static constexpr int kMost =
+      (CodedBricks::kWidth + 1) * (CodedBricks::kWidth + 1) * (CodedBricks::kWidth + 1);
+
+  const float* first;
+  int width;
+};
+
+// The nodes 0 to 8 of a brick, and those before them, which its neighbours hold, where they are needed.
+DecodedBrick decoded(const RenderVolume& volume, const Vec3i& brick, bool needsBefore, float* nodes) {
+  const BrickGrid& grid = volume.density();
+  if (!needsBefore) {
+    volume.coded().decode(grid.tableIndex(brick), nodes);
+    return {nodes, CodedBricks::kWidth};
+  }
+  constexpr int kWidth = CodedBricks::kWidth + 1;
+  float* out = nodes;
+  for (int z = -1; z != CodedBricks::kWidth; ++z)
+    for (int y = -1; y != CodedBricks::kWidth; ++y)
+      for (int x = -1; x != CodedBricks::kWidth; ++x) {
+        const Vec3i side{x < 0, y < 0, z < 0}, place = brick - side;
+        *out++ = grid.covers(place)
+                     ? volume.coded().at(grid.tableIndex(place), Vec3i{x, y, z} + side * BrickGrid::kBrick)
+                     : 0.0f;
+      }
+  return {nodes + (kWidth + 1) * kWidth + 1, kWidth};
+}
+
 // A row of samples along x.
 struct SampleRow {
   static constexpr int kMost = 2 * BrickGrid::kBrick;
@@ -65,18 +94,13 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
     share[n] = at[n] - float(low[n]);
   }
   parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
-    float density[SampleRow::kMost], nodes[CodedBricks::kNodes];
+    float density[SampleRow::kMost], nodes[DecodedBrick::kMost];
     for (std::size_t i = begin; i != end; ++i) {
       const Vec3i origin = (occupied[i] - place.firstBrick) * perBrick;
       const std::int32_t pool = grid.poolIndex(occupied[i]);
       const Interval& range = grid.ranges()[std::size_t(pool)];
-      const float* values = grid.brick(pool) + sampleOffset(0, 0, 0);
-      int width = BrickGrid::kWidth;
-      if (!volume.hasSamples() && !range.isPoint()) {
-        volume.coded().decode(grid.tableIndex(occupied[i]), nodes);
-        values = nodes;
-        width = CodedBricks::kWidth;
-      }
+      DecodedBrick brick{grid.brick(pool) + sampleOffset(0, 0, 0), BrickGrid::kWidth};
+      if (!volume.hasSamples() && !range.isPoint()) brick = decoded(volume, occupied[i], low[0] < 0, nodes);
       std::fill_n(density, across, range.max);
       for (int z = 0; z != across; ++z)
         for (int y = 0; y != across; ++y) {
@@ -84,7 +108,7 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
           if (!range.isPoint()) {
             const float* rows[4];
             for (int n = 0; n != 4; ++n)
-              rows[n] = values + ((low[z] + n / 2) * width + low[y] + n % 2) * width;
+              rows[n] = brick.first + ((low[z] + n / 2) * brick.width + low[y] + n % 2) * brick.width;
             most = 0;
             for (int x = 0; x != across; ++x) {
               const auto along = [&](const float* row) {
@@ -113,10 +137,6 @@ float samplesPerCell(const LatticePlacement& place) {
 }
 
 }  // namespace
-
-bool readsOwnNodes(const LatticePlacement& place) {
-  return spacingOf(place) >= 1.0f;
-}
 
 LatticePlacement::LatticePlacement(const RenderVolume& volume, int longestSide) {
   const Box box = volume.indexBounds();

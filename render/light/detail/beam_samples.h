@@ -25,9 +25,6 @@ struct LatticePlacement {
   double cellsNear(const RenderVolume& volume, int reach) const;
 };
 
-/// Whether no sample lies before the first node of its brick, so that coded bricks do as well.
-bool readsOwnNodes(const LatticePlacement& place);
-
 /// Sets the lattice's densities: means of what the march reads between the voxels.
 void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice);
 

@@ -55,6 +55,7 @@ PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
       extinction_(medium.extinction * largest(medium.extinctionColour)),
       colour_(medium.extinctionColour / largest(medium.extinctionColour)),
       perEmission_(medium.extinction) {
+  require(volume.hasSamples(), "path tracer: the samples of the density were given back");
   const BrickGrid& grid = volume.density();
   scene_.density = {grid.values().data(), grid.table().data(), grid.brickCount()};
   scene_.ranges = grid.ranges().data();

@@ -65,8 +65,8 @@ TEST(LitVolume, AnEmptyVolumeMakesPicturesOfZeros) {
 }
 
 TEST(LitVolume, LooksTheSameWhoseSamplesAreGivenBack) {
-  // So long that light reads codes; and so short that it needs the samples first. Codes are half of 1 / 57343
-  // of a brick's largest value off, in every sum of many the less.
+  // So long that cells are wide; and so short that samples lie between bricks. Codes are half of 1 / 57343 of
+  // a brick's largest value off, in every sum of many the less.
   for (const int longest : {160, 40}) {
     const auto grid = test::densityGrid(
         test::voxels(0.1f), {-longest, -10, -10}, {longest, 10, 10},
@@ -90,6 +90,17 @@ TEST(LitVolume, LooksTheSameWhoseSamplesAreGivenBack) {
       given.giveUpSamples();
     }
   }
+}
+
+TEST(LitVolume, RefusesLightThatNeedsSamplesWhichWereGivenBack) {
+  RenderVolume volume(test::ball(1.0f, 0.25f));
+  volume.giveUpSamples();
+  volume.coded();
+  LocalLight point;
+  point.position = {0, 3, 0};
+  const Lights near{{}, {}, {point}};
+  EXPECT_THROW(LitVolume(volume, {}, near, {}), Error);
+  EXPECT_NO_THROW(LitVolume(volume, {}, kLights, {}));
 }
 
 TEST(LitVolume, RefusesOctavesOtherThanItsOwn) {

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <vector>
 
 #include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/render/volume/coded_density.h"
 #include "nephele/render/volume/render_volume.h"
 #include "tests/support/density.h"
 #include "tests/support/each_target.h"
@@ -139,6 +142,66 @@ TEST(CodedBricks, TakeTheMemoryOfSamplesThatAreGivenUp) {
   shared.giveUpSamples();
   shared.coded();
   EXPECT_EQ(shared.density().values(), grid->values());
+}
+
+// A fog as it comes from a file, of many parts: bumps between constant bricks.
+VdbGrid fog() {
+  const auto grid =
+      test::densityGrid(test::voxels(0.1f), {-150, -60, -60}, {150, 60, 60}, [](const Vec3f& p) {
+        return std::clamp(1.5f + std::sin(2 * p.x) * std::cos(3 * p.y) - 0.05f * dot(p, p), 0.0f, 1.0f);
+      });
+  return toVdb(*grid, {"density", VdbGridInfo::Class::fogVolume});
+}
+
+TEST(CodedDensity, IsToldOfEveryBrickOnceAndInOrder) {
+  const VdbGrid vdb = fog();
+  const auto whole = toBricks(vdb);
+  std::int32_t next = 0;
+  std::vector<float> samples;
+  const auto told = toBricks(vdb, [&](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
+    EXPECT_EQ(begin, next);
+    EXPECT_EQ(grid.poolSize(), whole->poolSize());
+    next = end;
+    samples.insert(samples.end(), grid.brick(begin), grid.brick(end));
+  });
+  EXPECT_EQ(std::size_t(next), whole->poolSize());
+  EXPECT_TRUE(std::equal(samples.begin(), samples.end(), whole->values().begin(), whole->values().end()));
+  EXPECT_EQ(told->table(), whole->table());
+}
+
+TEST(CodedDensity, KnowsWhatTheSamplesTell) {
+  const VdbGrid vdb = fog();
+  const RenderVolume all(toBricks(vdb));
+  CodedDensity coded;
+  const auto grid = toBricks(
+      vdb, [&](BrickGrid& bricks, std::int32_t begin, std::int32_t end) { coded.take(bricks, begin, end); });
+  const RenderVolume volume(grid, std::move(coded));
+  EXPECT_FALSE(volume.hasSamples());
+  EXPECT_LT(volume.memoryBytes(), all.memoryBytes() - all.density().values().size() * 3);
+  EXPECT_EQ(volume.typicalDensity(), all.typicalDensity());
+  EXPECT_EQ(volume.outline(), all.outline());
+  EXPECT_EQ(volume.worldBounds().min, all.worldBounds().min);
+  EXPECT_EQ(volume.worldBounds().max, all.worldBounds().max);
+  for (std::size_t place = 0; place < grid->table().size(); place += 3)
+    for (const Vec3i& node : {Vec3i{0, 0, 0}, Vec3i{3, 8, 5}, Vec3i{8, 8, 8}})
+      ASSERT_EQ(volume.coded().at(place, node), all.coded().at(place, node)) << place;
+}
+
+TEST(BrickMeasures, FindWhereAnythingIs) {
+  std::vector<float> brick(BrickGrid::kVolume, -1.0f);
+  EXPECT_GT(BrickMeasures::of(brick.data()).first[0], BrickMeasures::of(brick.data()).last[0]);
+  // Beside the nodes 0 to 8 nothing counts.
+  brick[std::size_t(sampleOffset(-1, 3, 3))] = brick[std::size_t(sampleOffset(4, 9, 2))] = 5;
+  EXPECT_GT(BrickMeasures::of(brick.data()).first[1], BrickMeasures::of(brick.data()).last[1]);
+  // Of these three, two are among its own voxels.
+  brick[std::size_t(sampleOffset(0, 5, 7))] = 0.5f;
+  brick[std::size_t(sampleOffset(2, 4, 7))] = 2;
+  brick[std::size_t(sampleOffset(1, 4, 8))] = 1;
+  const BrickMeasures found = BrickMeasures::of(brick.data());
+  EXPECT_EQ(found.first, (std::array<std::int8_t, 3>{0, 4, 7}));
+  EXPECT_EQ(found.last, (std::array<std::int8_t, 3>{2, 5, 8}));
+  EXPECT_EQ(found.density, 2.5);
+  EXPECT_EQ(found.squares, 4.25);
 }
 
 }  // namespace
