@@ -144,7 +144,7 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   detail::TransportSolver solver(std::move(lattice), std::move(medium));
   moments_ = solver.solve(
       sky_,
-      [&](const detail::ScatteringLattice& level, const detail::CellRows& rows, std::vector<float>& light) {
+      [&](const detail::ScatteringLattice& level, const detail::CellRows& rows, detail::Moments& light) {
         addBeam(light, level, rows, level.voxels / finest);
       },
       {options.sweeps, options.tolerance}, progress);
@@ -163,7 +163,7 @@ Vec3f ScatteredLight::wayOfBeam(const Vec3f& node) const {
 }
 
 // Adds the moments of the beam to those of a lattice whose cells are so many times wider.
-void ScatteredLight::addBeam(std::vector<float>& moments, const detail::ScatteringLattice& lattice,
+void ScatteredLight::addBeam(detail::Moments& moments, const detail::ScatteringLattice& lattice,
                              const detail::CellRows& rows, float wider) const {
   const std::size_t count = hasWay() ? moments.size() / rows.count() : 1;
   const int degree = int(phase_.size()) - 1;

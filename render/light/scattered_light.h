@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/light/phase_expansion.h"
@@ -112,7 +113,7 @@ class ScatteredLight {
   static Bytes estimateBytes(const RenderVolume& volume) { return estimateBytes(volume, Options{}); }
 
  private:
-  void addBeam(std::vector<float>& moments, const detail::ScatteringLattice& lattice,
+  void addBeam(detail::UnsetVector<float>& moments, const detail::ScatteringLattice& lattice,
                const detail::CellRows& rows, float wider) const;
   Vec3f wayOfBeam(const Vec3f& node) const;
   bool hasWay() const { return towards_ || place_; }
@@ -130,7 +131,7 @@ class ScatteredLight {
   std::vector<float> sky_;
   // Nodes near density, and the moments of the light at each of them, beam and all.
   std::shared_ptr<const detail::CellRows> rows_;
-  std::vector<float> moments_;
+  detail::UnsetVector<float> moments_;
   // The beam alone and the density, at all nodes.
   std::vector<float> beam_, density_;
   int sweeps_ = 0;

@@ -7,11 +7,10 @@
 #include <cmath>
 
 #include "nephele/modeling/base/parallel.h"
-#include "nephele/render/light/detail/cell_rows.h"
 
 namespace nephele::detail {
 
-float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
+float Anderson::step(Moments& x, const Moments& g) {
   const std::size_t n = weights_.size();
   constexpr std::size_t piece = 1 << 15;
   if (!lastG_.empty()) {
@@ -19,7 +18,8 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
       std::rotate(dg_.begin(), dg_.begin() + 1, dg_.end());
       std::rotate(df_.begin(), df_.begin() + 1, df_.end());
     } else {
-      dg_.emplace_back(x.size()), df_.emplace_back(n);
+      resizeLarge(dg_.emplace_back(), x.size());
+      df_.emplace_back(n);
     }
   }
   const std::size_t m = dg_.size();
@@ -47,7 +47,7 @@ float Anderson::step(std::vector<float>& x, const std::vector<float>& g) {
 
   const bool isFirst = lastG_.empty();
   lastF_.resize(n);
-  lastG_.resize(x.size());
+  resizeLarge(lastG_, x.size());
   std::vector<std::array<double, 2>> changes(pieces.size());
   parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p != end; ++p) {

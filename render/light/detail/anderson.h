@@ -3,6 +3,8 @@
 #include <array>
 #include <vector>
 
+#include "nephele/render/light/detail/cell_rows.h"
+
 namespace nephele::detail {
 
 /// Anderson's acceleration of x = g(x) where x has several values per cell, see CellRows::momentsAt:
@@ -13,7 +15,7 @@ class Anderson {
   Anderson(const std::vector<float>& weights, std::size_t values) : weights_(weights), values_(values) {}
 
   /// Moves x, given g(x); returns the relative change of the first values.
-  float step(std::vector<float>& x, const std::vector<float>& g);
+  float step(Moments& x, const Moments& g);
 
  private:
   static constexpr std::size_t kMemory = 1, kColumns = kMemory + 1;
@@ -25,8 +27,10 @@ class Anderson {
   const std::vector<float>& weights_;
   std::size_t values_;
   // Of the first values: what the last step left.
-  std::vector<float> lastF_, lastG_;
-  std::vector<std::vector<float>> df_, dg_;
+  std::vector<float> lastF_;
+  Moments lastG_;
+  std::vector<std::vector<float>> df_;
+  std::vector<Moments> dg_;
 };
 
 }  // namespace nephele::detail

@@ -4,10 +4,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/math.h"
 #include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
+
+/// Moments of light in the cells of CellRows, see CellRows::momentsAt.
+using Moments = UnsetVector<float>;
 
 /// The cells of a lattice that matter, side by side: of every row along the first axis those from the first
 /// to the last that do, as whole vectors.

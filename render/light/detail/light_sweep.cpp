@@ -114,17 +114,19 @@ LightSweep::LightSweep(const CellRows& rows, const std::vector<float>& density, 
   turn(rows, density.data(), turnedRows_, turnedDensity_.data(), 1);
   plain_ = {&rows, &density, {}};
   turned_ = {&turnedRows_, &turnedDensity_, {}};
-  turnedMoments_.resize(momentCount_ * turnedRows_.count());
-  turnedSums_.resize(turnedMoments_.size());
+  // Squares of which nothing is kept are not turned.
+  resizeLarge(turnedMoments_, momentCount_ * turnedRows_.count());
+  std::fill(turnedMoments_.begin(), turnedMoments_.end(), 0.0f);
+  resizeLarge(turnedSums_, turnedMoments_.size());
   if (rows.count() < kSmall) sidewaysSums_.resize(momentCount_ * rows.count());
 }
 
-void LightSweep::sweep(const std::vector<float>& moments, std::vector<float>& result, bool hasInflow) {
+void LightSweep::sweep(const Moments& moments, Moments& result, bool hasInflow) {
   const CellRows& rows = *plain_.rows;
   turn(rows, moments.data(), turnedRows_, turnedMoments_.data(), momentCount_);
   findSlopes(moments);
   const bool isSmall = rows.count() < kSmall;
-  std::vector<float>* const sums[3] = {&turnedSums_, isSmall ? &sidewaysSums_ : &result, &result};
+  Moments* const sums[3] = {&turnedSums_, isSmall ? &sidewaysSums_ : &result, &result};
   const auto carryAlong = [&](std::size_t begin, std::size_t end) {
     for (std::size_t axis = begin; axis != end; ++axis) {
       // Those along y and z are added up in one place, unless that is done at the same time.
@@ -145,7 +147,7 @@ void LightSweep::sweep(const std::vector<float>& moments, std::vector<float>& re
 }
 
 // Central differences of the first moment; one-sided where a neighbour holds nothing.
-void LightSweep::findSlopes(const std::vector<float>& moments) {
+void LightSweep::findSlopes(const Moments& moments) {
   const CellRows& rows = *plain_.rows;
   const std::vector<float>& density = *plain_.density;
   for (std::vector<float>& slopes : plain_.slopes) slopes.resize(rows.count());
@@ -187,8 +189,8 @@ struct LightSweep::Wave {
   std::size_t offsets[4];
 };
 
-LightSweep::Wave LightSweep::wave(const Group& group, const std::vector<float>& moments,
-                                  std::vector<float>& sums, bool hasInflow) const {
+LightSweep::Wave LightSweep::wave(const Group& group, const Moments& moments, Moments& sums,
+                                  bool hasInflow) const {
   const Layout& layout = group.axis == 0 ? turned_ : plain_;
   // Axes along a row, from row to row and from slice to slice.
   const int u = group.axis == 0 ? 1 : 0, v = group.axis == 2 ? 1 : 2, w = group.axis;
@@ -235,8 +237,7 @@ LightSweep::Wave LightSweep::wave(const Group& group, const std::vector<float>& 
 }
 
 // All directions that rise along an axis, or fall, go through a slice while it is in the cache.
-void LightSweep::carry(int axis, bool rises, const std::vector<float>& moments, std::vector<float>& sums,
-                       bool hasInflow) const {
+void LightSweep::carry(int axis, bool rises, const Moments& moments, Moments& sums, bool hasInflow) const {
   std::vector<Wave> waves;
   for (const Group& group : groups_)
     if (group.axis == axis && group.rises == rises) waves.push_back(wave(group, moments, sums, hasInflow));

@@ -64,7 +64,7 @@ class LightSweep {
 
   /// Moments of the light in every cell that is kept, given those of the light that is scattered, see
   /// CellRows::momentsAt. Nothing comes in unless `hasInflow`.
-  void sweep(const std::vector<float>& moments, std::vector<float>& result, bool hasInflow = true);
+  void sweep(const Moments& moments, Moments& result, bool hasInflow = true);
 
  private:
   // The lattice as it lies, or turned so that x is the slowest axis.
@@ -81,12 +81,10 @@ class LightSweep {
     std::array<std::size_t, 4> ordinates;
   };
 
-  void findSlopes(const std::vector<float>& moments);
+  void findSlopes(const Moments& moments);
   struct Wave;
-  Wave wave(const Group& group, const std::vector<float>& moments, std::vector<float>& sums,
-            bool hasInflow) const;
-  void carry(int axis, bool rises, const std::vector<float>& moments, std::vector<float>& sums,
-             bool hasInflow) const;
+  Wave wave(const Group& group, const Moments& moments, Moments& sums, bool hasInflow) const;
+  void carry(int axis, bool rises, const Moments& moments, Moments& sums, bool hasInflow) const;
 
   float extinction_;
   const std::vector<Ordinate>& ordinates_;
@@ -99,7 +97,7 @@ class LightSweep {
   Layout plain_, turned_;
   std::vector<std::array<float, kMostMoments>> sources_, sums_;
   // Moments and sums of the directions along x, and in small lattices the sums of those along y.
-  std::vector<float> turnedMoments_, turnedSums_, sidewaysSums_;
+  Moments turnedMoments_, turnedSums_, sidewaysSums_;
 };
 
 }  // namespace nephele::detail

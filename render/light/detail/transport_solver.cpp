@@ -90,13 +90,14 @@ TransportSolver::TransportSolver(ScatteringLattice finest, Medium medium)
   }
 }
 
-std::vector<float> TransportSolver::solve(const std::vector<float>& guess, const AddFirst& addFirst,
-                                          const Limits& limits, const Progress& progress) {
-  std::vector<float> light, coarser;
+Moments TransportSolver::solve(const std::vector<float>& guess, const AddFirst& addFirst,
+                               const Limits& limits, const Progress& progress) {
+  Moments light, coarser;
   for (std::size_t level = levels_.size(); level-- != 0;) {
     const Level& here = levels_[level];
     const std::size_t cells = here.rows.count();
-    std::vector<float> begun(moments_ * cells);
+    Moments begun;
+    resizeLarge(begun, moments_ * cells);
     if (level + 1 == levels_.size())
       forEach(begun.size(), [&](std::size_t i) { begun[i] = guess[i / CellRows::kVector % moments_]; });
     else
@@ -104,17 +105,19 @@ std::vector<float> TransportSolver::solve(const std::vector<float>& guess, const
     coarser = std::move(light);
     light = std::move(begun);
     iterate(
-        level, light, [&](std::vector<float>& moments) { addFirst(here.lattice, here.rows, moments); }, true,
+        level, light, [&](Moments& moments) { addFirst(here.lattice, here.rows, moments); }, true,
         level == 0 ? limits : Limits{kSweepsOfCoarsest, kTightened * limits.tolerance}, progress);
   }
   if (levels_.size() > 1) extrapolate(coarser, light);
   return light;
 }
 
-void TransportSolver::extrapolate(const std::vector<float>& coarser, std::vector<float>& light) const {
+void TransportSolver::extrapolate(const Moments& coarser, Moments& light) const {
   const Level &fine = levels_[0], &coarse = levels_[1];
   const std::size_t cells = fine.rows.count(), coarseCells = coarse.rows.count();
-  std::vector<float> holds(coarseCells), near(cells), change(coarser.size()), grown(light.size());
+  std::vector<float> holds(coarseCells), near(cells);
+  Moments change(coarser.size()), grown;
+  resizeLarge(grown, light.size());
   forEach(coarseCells, [&](std::size_t i) { holds[i] = coarse.density[i] > 0; });
   refine(holds.data(), coarse.rows, fine.rows, 1, near.data());
   restrict(light.data(), nullptr, fine.rows, fine.density, coarse.rows, coarse.density, moments_,
@@ -136,11 +139,11 @@ void TransportSolver::extrapolate(const std::vector<float>& coarser, std::vector
   });
 }
 
-void TransportSolver::iterate(std::size_t level, std::vector<float>& light,
-                              const std::function<void(std::vector<float>&)>& add, bool hasInflow,
-                              const Limits& limits, const Progress& progress) {
+void TransportSolver::iterate(std::size_t level, Moments& light, const std::function<void(Moments&)>& add,
+                              bool hasInflow, const Limits& limits, const Progress& progress) {
   Anderson anderson(levels_[level].density, moments_);
-  std::vector<float> swept(light.size());
+  Moments swept;
+  resizeLarge(swept, light.size());
   for (int sweep = 1;; ++sweep) {
     progress.check();
     levels_[level].sweep->sweep(light, swept, hasInflow);
@@ -161,18 +164,16 @@ void TransportSolver::iterate(std::size_t level, std::vector<float>& light,
 }
 
 // Adds to what was swept what is still missing of it.
-void TransportSolver::addCoarse(std::size_t level, const std::vector<float>& light, std::vector<float>& swept,
+void TransportSolver::addCoarse(std::size_t level, const Moments& light, Moments& swept,
                                 const Progress& progress) {
   const Level &fine = levels_[level], &coarse = levels_[level + 1];
-  std::vector<float> rest(moments_ * coarse.rows.count());
+  Moments rest(moments_ * coarse.rows.count());
   restrict(swept.data(), light.data(), fine.rows, fine.density, coarse.rows, coarse.density, moments_,
            rest.data());
-  std::vector<float> missing = rest;
+  Moments missing = rest;
   iterate(
       level + 1, missing,
-      [&](std::vector<float>& moments) {
-        forEach(moments.size(), [&](std::size_t i) { moments[i] += rest[i]; });
-      },
+      [&](Moments& moments) { forEach(moments.size(), [&](std::size_t i) { moments[i] += rest[i]; }); },
       false, {level + 2 == levels_.size() ? kSweepsOfCoarsest : kSweepsOfError, kToleranceOfError}, progress);
   forEach(missing.size(), [&](std::size_t i) { missing[i] -= rest[i]; });
   refine(missing.data(), coarse.rows, fine.rows, moments_, swept.data(), true);

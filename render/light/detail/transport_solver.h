@@ -28,7 +28,7 @@ class TransportSolver {
     std::vector<float> inflow;
   };
   /// Adds b to the moments of a lattice's cells.
-  using AddFirst = std::function<void(const ScatteringLattice&, const CellRows&, std::vector<float>&)>;
+  using AddFirst = std::function<void(const ScatteringLattice&, const CellRows&, Moments&)>;
 
   TransportSolver(ScatteringLattice finest, Medium medium);
 
@@ -40,8 +40,8 @@ class TransportSolver {
   };
   /// `guess`: moments of the light to begin with, the same everywhere. Returns moments of the cells of
   /// finestRows(), see CellRows::momentsAt.
-  std::vector<float> solve(const std::vector<float>& guess, const AddFirst& addFirst, const Limits& limits,
-                           const Progress& progress);
+  Moments solve(const std::vector<float>& guess, const AddFirst& addFirst, const Limits& limits,
+                const Progress& progress);
 
   ScatteringLattice& finest() { return levels_[0].lattice; }
   /// Cells with density, and those within reach of them.
@@ -58,13 +58,11 @@ class TransportSolver {
     std::unique_ptr<LightSweep> sweep;
   };
 
-  void iterate(std::size_t level, std::vector<float>& light,
-               const std::function<void(std::vector<float>&)>& add, bool hasInflow, const Limits& limits,
-               const Progress& progress);
-  void addCoarse(std::size_t level, const std::vector<float>& light, std::vector<float>& swept,
-                 const Progress& progress);
+  void iterate(std::size_t level, Moments& light, const std::function<void(Moments&)>& add, bool hasInflow,
+               const Limits& limits, const Progress& progress);
+  void addCoarse(std::size_t level, const Moments& light, Moments& swept, const Progress& progress);
 
-  void extrapolate(const std::vector<float>& coarser, std::vector<float>& light) const;
+  void extrapolate(const Moments& coarser, Moments& light) const;
 
   Medium medium_;
   // Each stays where it is: its sweep refers to it.
