@@ -21,9 +21,10 @@ std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::str
                             path, info.name));
   // A brick holds 11^3 samples for 8^3 voxels, rarely all in use.
   const Vec3d size(info.indexMax - info.indexMin);
-  run.requireMemory(
-      25.0 * double(info.activeVoxels) + (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 6,
-      "make the volume with larger voxels");
+  // What is coded is counted by who codes it.
+  run.requireMemory((made ? 0.0 : 25.0) * double(info.activeVoxels) +
+                        (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 6,
+                    "make the volume with larger voxels");
   return toBricks(vdb, made);
 }
 
@@ -67,7 +68,10 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   BrickSink made;
   if (reading.coded && part.share == 1 && !options.hasOthers()) {
     part.coded = std::make_shared<CodedDensity>();
-    made = [coded = part.coded](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
+    made = [coded = part.coded, &run](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
+      if (begin == 0)
+        run.requireMemory(CodedBricks::estimateBytes(double(grid.poolSize()), double(grid.places().size())),
+                          "make the volume with larger voxels");
       coded->take(grid, begin, end);
     };
   }
