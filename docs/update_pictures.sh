@@ -25,9 +25,9 @@ grow() {
 
 # show NAME VOLUME ...: NAME.png, on the way to a picture.
 show() {
-  name=$1
+  shown=$1.png
   shift
-  "$program" render "$@" -o show.exr --preview "$name.png" --quiet --aov none
+  "$program" render "$@" -o show.exr --preview "$shown" --quiet --aov none
 }
 
 # keep PICTURE: what was made is now in docs/pictures.
@@ -37,7 +37,7 @@ keep() { cp "$1" "$docs/pictures/$1" && echo "$1"; }
 tiles() {
   picture=$1 grid=$2
   shift 2
-  oiiotool "$@" --mosaic $padding "$grid" --quality 88 -o "$picture"
+  oiiotool "$@" "--mosaic$padding" "$grid" --quality 88 -o "$picture"
   keep "$picture"
 }
 
@@ -180,7 +180,7 @@ if picture cloud_fields; then
   grow even.vdb cloud $base $flat
   grow height.vdb cloud $base $flat --amplitude height:0=0.2%,0.3=0.4%,0.6=3.2%
   grow facing.vdb cloud $base $flat --amplitude facing:1,0,0:-0.3=0.2%,0.5=3.2%
-  grow along.vdb cloud $base $flat --frequency along:1,0,0:0=4x,1=12x
+  grow along.vdb cloud $base --resolution 400 --seed 7 --flat-base 2%,4% --frequency along:1,0,0:0=4x,1=12x
   for name in even height facing along; do show field_$name $name.vdb --size 320x240 --extinction 100 --backdrop; done
   padding="" tiles cloud_fields.png 2x2 field_even.png field_height.png field_facing.png field_along.png
 fi

@@ -128,8 +128,10 @@ def sheet(options, group, suns, out):
     """Row by row the suns; side by side path traced, marched, rendered by Cycles, and the error of what is marched by blocks: red is too
     bright, blue too dark, full at 20 %."""
     parts, width, height = [], *SIZE
-    by_cycles = [inside(options, f"cycles/{scene.name}_{max(options.cycles_samples)}.exr") for scene in suns]
-    is_there = all(map(os.path.exists, by_cycles))
+    by_cycles = [""] * len(suns)
+    for samples in sorted(options.cycles_samples):
+        found = [inside(options, f"cycles/{scene.name}_{samples}.exr") for scene in suns]
+        by_cycles = found if all(map(os.path.exists, found)) else by_cycles
     for scene, theirs in zip(suns, by_cycles):
         traced, _ = parts_of(options, scene)
         reference, marched = Reference(traced), inside(options, f"march/{scene.name}_good.exr")
@@ -138,7 +140,7 @@ def sheet(options, group, suns, out):
         sums = files[:1] + [word for file in files[1:] for word in (file, "--add")]
         subprocess.run(["oiiotool", *sums, "--mulc", repr(1 / len(files)), "-o", mean], check=True)
         sky = dict(zip(scene.medium[0::2], scene.medium[1::2]))["--sky"]
-        for source in [mean, marched] + [theirs] * is_there:
+        for source in [mean, marched] + [theirs] * bool(theirs):
             parts.append(inside(options, f"sheet/{len(parts)}.exr"))
             subprocess.run(["oiiotool", source, "--ch", "R,G,B,A", "--pattern", f"constant:color={sky},1", f"{width}x{height}", "4",
                             "--over", "--ch", "R,G,B", "--mulc", repr(EXPOSURE[group]), "--colorconvert", "linear", "sRGB",
