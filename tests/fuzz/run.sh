@@ -35,7 +35,7 @@ done
 inputs_of() {
   case $1 in
     vdb) echo 200 ;;
-    deep) echo 400 ;;
+    deep) echo 3000 ;;
     nvdb | exr) echo 500 ;;
     png | hdr) echo 1500 ;;
     chan) echo 3000 ;;

@@ -210,7 +210,10 @@ TEST(VdbIo, RefusesTwoGridsOfOneNameInOneLine) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.vdb");
   const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"smoke\n2", Class::fogVolume});
-  EXPECT_EQ(errorOf([&] { writeVdbFile(path, {grid, grid}, {}); }), path + ": two grids are called 'smoke\\n2'");
+  EXPECT_EQ(errorOf([&] {
+              writeVdbFile(path, {grid, grid}, {});
+            }),
+            path + ": two grids are called 'smoke\\n2'");
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
