@@ -44,6 +44,11 @@ constexpr float kDeepestCell = 2.0f;
 // Moments below this are not worth a degree.
 constexpr float kSmallMoment = 0.1f;
 
+// Of the moments that so many directions can tell apart.
+int mostDegree(int order) {
+  return order == 4 ? 2 : order == 6 ? 3 : detail::kMostDegree;
+}
+
 void check(const Scattering& scattering, const ScatteredLight::Options& options) {
   require(options.longestSide >= 8 && options.sweeps >= 1,
           "scattered light: needs at least 8 nodes and a sweep");
@@ -76,7 +81,7 @@ ScatteredSource ScatteredSource::evenSky() {
 }
 
 int ScatteredLight::Options::degree(const std::vector<float>& phase) const {
-  const int most = order == 4 ? 2 : order == 6 ? 3 : detail::kMostDegree;
+  const int most = mostDegree(order);
   int degree = 0;
   while (degree < most && std::size_t(degree) + 1 < phase.size() &&
          std::fabs(phase[std::size_t(degree) + 1]) > kSmallMoment)
@@ -207,9 +212,7 @@ float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options&
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
   const detail::LatticePlacement place(volume, options.longestSide);
-  const double moments = detail::momentCount(options.order == 4   ? 2
-                                             : options.order == 6 ? 3
-                                                                  : detail::kMostDegree);
+  const double moments = detail::momentCount(mostDegree(options.order));
   double nodes = place.cells(), near = place.cellsNear(volume, detail::TransportSolver::kReach);
   const double sampled = nodes;
   for (int longest = place.longest(); 2 * longest > 3 * options.longestSide; longest /= 2)

@@ -28,6 +28,13 @@ def medians(program, pattern, time, extra):
     return series
 
 
+def curve(points, colour):
+    """A line through places on the picture, with a dot at each."""
+    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    return [f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"/>',
+            *(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in points)]
+
+
 def panel(lines, column, title, counted, left, doubling=None):
     top_value = 1.08 * max(point[column] for line in lines for point in line.points)
     last = max(point[0] for line in lines for point in line.points)
@@ -47,9 +54,7 @@ def panel(lines, column, title, counted, left, doubling=None):
         out.append(f'<polyline points="{path}" fill="none" stroke="#888" stroke-dasharray="4 3"/>')
         out.append(f'<text x="{x(13):.1f}" y="{TOP + 14}" fill="#666">{doubling}</text>')
     for row, line in enumerate(lines):
-        path = " ".join(f"{x(p[0]):.1f},{y(p[column]):.1f}" for p in line.points)
-        out.append(f'<polyline points="{path}" fill="none" stroke="{line.colour}" stroke-width="2"/>')
-        out += [f'<circle cx="{x(p[0]):.1f}" cy="{y(p[column]):.1f}" r="3" fill="{line.colour}"/>' for p in line.points]
+        out += curve([(x(p[0]), y(p[column])) for p in line.points], line.colour)
         out.append(f'<text x="{left + 12}" y="{TOP + 16 + 18 * row}" fill="{line.colour}">{line.label}</text>')
     return out
 
@@ -86,9 +91,7 @@ def logarithmic_panel(lines, title, counted, left, top):
                    f'<text x="{at:.1f}" y="{top + HEIGHT + 18}" text-anchor="middle">{10.0**power:g}</text>')
     out.append(f'<text x="{left + WIDTH / 2}" y="{top + HEIGHT + 36}" text-anchor="middle">{counted}</text>')
     for row, line in enumerate(kept):
-        path = " ".join(f"{x(p[0]):.1f},{y(p[1]):.1f}" for p in line.points)
-        out.append(f'<polyline points="{path}" fill="none" stroke="{line.colour}" stroke-width="2"/>')
-        out += [f'<circle cx="{x(p[0]):.1f}" cy="{y(p[1]):.1f}" r="3" fill="{line.colour}"/>' for p in line.points]
+        out += curve([(x(p[0]), y(p[1])) for p in line.points], line.colour)
         out.append(f'<text x="{left + WIDTH - 8}" y="{top + 18 + 18 * row}" text-anchor="end" fill="{line.colour}">{line.label}</text>')
     return out
 
