@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <iostream>
 #include <new>
+#include <span>
 
 #include "apps/detail/program_run.h"
 #include "apps/options/config_file.h"
@@ -30,10 +31,14 @@ std::string quoted(const std::string& argument) {
   return result + "'";
 }
 
-std::string commandLineOf(int argc, char** argv) {
-  std::string line = "nephele";
-  for (int i = 1; i < argc; ++i) line += " " + quoted(argv[i]);
+std::string joined(std::span<const std::string> arguments) {
+  std::string line;
+  for (const std::string& argument : arguments) line += (line.empty() ? "" : " ") + quoted(argument);
   return line;
+}
+
+std::string commandLineOf(int argc, char** argv) {
+  return "nephele " + joined(std::vector<std::string>(argv + 1, argv + argc));
 }
 
 void addCommonOptions(CLI::App& app, CommonOptions& options) {
@@ -152,7 +157,10 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
 
   const std::string who = "nephele " + verb.name;
   try {
-    arguments = withConfigFile(app, withFilesAfterDashes(std::move(arguments)));
+    arguments = withFilesAfterDashes(std::move(arguments));
+    const std::size_t typed = arguments.size();
+    arguments = withConfigFile(app, std::move(arguments));
+    const std::string configOptions = joined(std::span(arguments).subspan(typed));
     for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
     std::reverse(arguments.begin(), arguments.end());
     app.parse(std::move(arguments));
@@ -165,6 +173,7 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
     }
     ProgramRun run(verb.name, options);
     run.commandLine = commandLine;
+    run.configOptions = configOptions;
     const std::size_t threads =
         options.threads > 0 ? std::size_t(options.threads)
                             : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);

@@ -26,7 +26,10 @@ class Run : public Progress {
   /// The command line as typed, for file metadata.
   std::string commandLine;
 
-  /// Metadata that every output carries: creator, version, command line.
+  /// The options that came from --config, as they would be typed; "" where none did.
+  std::string configOptions;
+
+  /// Metadata that every output carries: creator, version, command line, options of a configuration file.
   std::map<std::string, std::string> metadata() const;
 
   /// Refuses work that needs more than --memory-limit.

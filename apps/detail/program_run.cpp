@@ -7,6 +7,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
@@ -70,7 +71,10 @@ double parseMemoryLimit(const std::string& text) {
 }
 
 std::map<std::string, std::string> Run::metadata() const {
-  return {{"creator", "nephele"}, {"version", NEPHELE_VERSION}, {"command_line", commandLine}};
+  std::map<std::string, std::string> all{
+      {"creator", "nephele"}, {"version", NEPHELE_VERSION}, {"command_line", commandLine}};
+  if (!configOptions.empty()) all["config_options"] = configOptions;
+  return all;
 }
 
 void Run::requireMemory(double estimatedBytes, const std::string& remedy) const {
@@ -91,6 +95,7 @@ void ProgramRun::begin(std::string_view stage) const {
   endStage();
   stage_ = stage;
   stageStart_ = Clock::now();
+  timeLeft_ = {};
   stages_.push_back({{"name", stage_}});
 }
 
@@ -145,18 +150,20 @@ void ProgramRun::draw(double fraction) const {
   }
   if (options_.quiet || stage_.empty()) return;
   const double seconds = std::chrono::duration<double>(Clock::now() - stageStart_).count();
+  timeLeft_.note(seconds, fraction);
   if (seconds < 0.5) return;
-  const double left = fraction > 0 ? seconds * (1 - fraction) / fraction : 0;
+  const std::optional<double> left = timeLeft_.seconds();
   if (terminal_) {
     constexpr int kWidth = 30;
     const int filled = int(fraction * kWidth);
-    say("\r\033[K{} [{}{}] {:3.0f} %  {:.1f} %/s  {:.0f} s left", stage_, std::string(filled, '#'),
-        std::string(kWidth - filled, '.'), fraction * 100, fraction * 100 / seconds, left);
+    say("\r\033[K{} [{}{}] {:3.0f} %{}", stage_, std::string(filled, '#'), std::string(kWidth - filled, '.'),
+        fraction * 100, left ? fmt::format("  {:.0f} s left", *left) : "");
     std::fflush(stderr);
     barShown_ = true;
   } else if (const auto now = lastDrawn_.load(); seconds >= 2 && now - lastLine_ >= 5000) {
     lastLine_ = now;
-    say("nephele {}: {}: {:.0f} %, {:.0f} s left\n", verb_, stage_, fraction * 100, left);
+    say("nephele {}: {}: {:.0f} %{}\n", verb_, stage_, fraction * 100,
+        left ? fmt::format(", {:.0f} s left", *left) : "");
   }
 }
 
@@ -201,6 +208,7 @@ void ProgramRun::finish() const {
 
 nlohmann::json ProgramRun::statistics() const {
   nlohmann::json all = {{"command", commandLine}, {"version", NEPHELE_VERSION}};
+  if (!configOptions.empty()) all["config_options"] = configOptions;
   all["seconds"] = std::chrono::duration<double>(Clock::now() - start_).count();
   all["peak_memory_bytes"] = peakMemory();
   all["stages"] = stages_;

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "apps/app.h"
+#include "apps/detail/time_left.h"
 
 namespace nephele::apps {
 
@@ -55,6 +56,7 @@ class ProgramRun : public Run {
   mutable std::mutex mutex_;
   mutable std::string stage_;
   mutable Clock::time_point stageStart_;
+  mutable TimeLeft timeLeft_;
   mutable nlohmann::json stages_ = nlohmann::json::array();
   mutable bool barShown_ = false;
   mutable double from_ = 0, to_ = 1;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"
 
 namespace nephele::test {
@@ -122,6 +123,20 @@ TEST(Program, ConfigFileSetsOptionsAndTheCommandLineWins) {
   ASSERT_EQ(runProgram(common + " --resolution 48").exitCode, 0);
   const double fine = nlohmann::json::parse(textOf(folder.file("stats.json")))["grid"]["voxel_size"];
   EXPECT_NEAR(coarse / fine, 2.0, 1e-6) << "48 voxels along a side are twice as small as 24";
+}
+
+TEST(Program, FilesSayWhatWasTypedAndWhatAConfigFileGave) {
+  const TemporaryFolder folder;
+  const std::string config = folder.file("options.toml"), out = folder.file("out.vdb");
+  std::ofstream(config) << "resolution = 24\nhalf-width = 5\n";
+  const std::string typed = "levelset " + kMesh + " --half-width 4 --config " + config + " -o " + out;
+  ASSERT_EQ(runProgram(typed).exitCode, 0);
+  const auto metadata = describe(readVdbFile(out)[0]).metadata;
+  EXPECT_EQ(metadata.at("command_line"), "nephele " + typed);
+  // What was typed wins, and is not among them.
+  EXPECT_EQ(metadata.at("config_options"), "--resolution=24");
+  ASSERT_EQ(runProgram("levelset " + kMesh + " --resolution 24 -o " + out).exitCode, 0);
+  EXPECT_FALSE(describe(readVdbFile(out)[0]).metadata.contains("config_options"));
 }
 
 TEST(Program, ConfigFileWithAnUnknownKeyNamesItsLine) {
