@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/image/exr_io.h"
 
 namespace nephele {
 
@@ -56,6 +58,57 @@ void addKnots(const std::vector<DeepSample>& samples, std::vector<Change>& chang
   }
 }
 
+/// Cameras as files have them, x right, y up.
+struct View {
+  Vec3d position, forward;
+};
+
+View viewOf(const Mat44& m) {
+  const auto row = [&](std::size_t r) { return Vec3d{m[4 * r], m[4 * r + 1], m[4 * r + 2]}; };
+  const Vec3d shift = row(3);
+  View view;
+  for (int axis = 0; axis != 3; ++axis) {
+    view.position[axis] = -dot(row(std::size_t(axis)), shift);
+    view.forward[axis] = row(std::size_t(axis)).z;
+  }
+  return view;
+}
+
+/// Whether `a`, or it looking along its -z, is `b`.
+bool isSame(const Mat44& a, const Mat44& b) {
+  constexpr double kNearly = 1e-4;
+  const double far = std::max({std::fabs(double(b[12])), std::fabs(double(b[13])), std::fabs(double(b[14]))});
+  const auto isWithin = [&](double sign) {
+    for (std::size_t i = 0; i != 16; ++i) {
+      const double factor = i % 4 == 2 ? sign : 1.0, most = kNearly * (i < 12 ? 1.0 : std::max(far, 1e-30));
+      if (std::fabs(factor * double(a[i]) - double(b[i])) > most && i % 4 != 3) return false;
+    }
+    return true;
+  };
+  return isWithin(1) || isWithin(-1);
+}
+
+void requireSameCamera(const std::string& path, const Camera& camera) {
+  const std::optional<ImageCamera> file = readImageCamera(path);
+  if (!file) return;
+  const ImageCamera wanted = camera;
+  if (!isSame(file->worldToCamera, wanted.worldToCamera)) {
+    const View theirs = viewOf(file->worldToCamera), ours = viewOf(wanted.worldToCamera);
+    throw Error(
+        fmt::format("{}: was made by another camera: at ({:.4g}, {:.4g}, {:.4g}), looking along "
+                    "({:.3g}, {:.3g}, {:.3g}); this one is at ({:.4g}, {:.4g}, {:.4g}), looking "
+                    "along ({:.3g}, {:.3g}, {:.3g})",
+                    path, theirs.position.x, theirs.position.y, theirs.position.z, theirs.forward.x,
+                    theirs.forward.y, theirs.forward.z, ours.position.x, ours.position.y, ours.position.z,
+                    ours.forward.x, ours.forward.y, ours.forward.z));
+  }
+  if (file->screenWidth != 1.0f && std::fabs(file->screenWidth / wanted.screenWidth - 1) > 1e-4f)
+    throw Error(
+        fmt::format("{}: was made by another camera: its picture is {:.4g} wide at distance 1, this "
+                    "one {:.4g}",
+                    path, file->screenWidth, wanted.screenWidth));
+}
+
 }  // namespace
 
 Holdout::Holdout(const DeepImage& image)
@@ -89,6 +142,7 @@ std::shared_ptr<const Holdout> readHoldout(const std::string& path, const Camera
   if (holdout->width() != camera.width() || holdout->height() != camera.height())
     throw Error(fmt::format("{}: is for pictures of {}x{}, but this one has {}x{}", path, holdout->width(),
                             holdout->height(), camera.width(), camera.height()));
+  requireSameCamera(path, camera);
   return holdout;
 }
 

@@ -38,7 +38,10 @@ class Holdout {
 };
 
 /// The holdout of a deep OpenEXR file. @throws Error naming the path if it cannot be read, or if it is not
-/// for pictures of the size of `camera`'s.
+/// for pictures of the size of `camera`'s, or was made by another camera: one whose `worldToCamera` turns or
+/// shifts what `camera` sees by more than a ten-thousandth, or, where `screenWindowWidth` is not the 1 that
+/// says nothing, whose picture is not as wide. Files without a camera are taken as they are, and so is a
+/// camera that looks along its -z.
 std::shared_ptr<const Holdout> readHoldout(const std::string& path, const Camera& camera,
                                            double mostBytes = 8e9);
 
