@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
@@ -43,6 +44,19 @@ struct Cover {
 
 constexpr const char* kNames[] = {"R", "G", "B", "A"};
 
+// R, G, B and A of an opaque picture.
+std::array<std::vector<float>, 4> inFrontOfBackdrop(const Image& frame) {
+  const std::vector<float>& alpha = frame.channel("A").values;
+  std::array<std::vector<float>, 4> result;
+  for (std::size_t c = 0; c != 3; ++c) {
+    const std::vector<float>& behind = frame.channel(std::string("backdrop.") + kNames[c]).values;
+    result[c] = frame.channel(kNames[c]).values;
+    for (std::size_t i = 0; i != alpha.size(); ++i) result[c][i] += (1 - alpha[i]) * behind[i];
+  }
+  result[3].assign(alpha.size(), 1.0f);
+  return result;
+}
+
 }  // namespace
 
 ContactSheet::ContactSheet(int frameCount, int frameWidth, int frameHeight,
@@ -73,10 +87,13 @@ void ContactSheet::set(int place, const Image& frame) {
           fmt::format("contact sheet: expected a frame of {}x{}, got {}x{}", frameWidth_, frameHeight_,
                       frame.width, frame.height));
   frame.check();
+  std::array<std::vector<float>, 4> inFront;
+  const bool hasBackdrop = frame.find("backdrop.R") && frame.find("backdrop.G") && frame.find("backdrop.B");
+  if (hasBackdrop) inFront = inFrontOfBackdrop(frame);
   const int left = gap_ + place % columns_ * (cellWidth_ + gap_),
             top = gap_ + place / columns_ * (cellHeight_ + gap_);
   for (std::size_t c = 0; c != std::size(kNames); ++c) {
-    const std::vector<float>& from = frame.channel(kNames[c]).values;
+    const std::vector<float>& from = hasBackdrop ? inFront[c] : frame.channel(kNames[c]).values;
     for (int y = 0; y != cellHeight_; ++y) {
       const Cover rows(y, frameHeight_, cellHeight_);
       for (int x = 0; x != cellWidth_; ++x) {

@@ -28,7 +28,7 @@ class ContactSheet {
   int rows() const { return (int(shown_.size()) + columns_ - 1) / columns_; }
 
   /// Puts a frame at its `place`, an index into shown(): every pixel of the sheet is the mean of those that
-  /// it covers, in linear light.
+  /// it covers, in linear light; where the frame has a layer `backdrop`, of the frame in front of it.
   /// @throws Error if the frame has another size or lacks R, G, B or A.
   void set(int place, const Image& frame);
 

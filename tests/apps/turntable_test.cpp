@@ -16,6 +16,19 @@
 namespace nephele::test {
 namespace {
 
+TEST_F(TurntableVerb, ShowsTheBackdropOnTheSheet) {
+  // A sheet of one frame of 64 x 36 has its pixels, 4 from the corner; dither and a rounding of 16 bits
+  // apart.
+  const ProgramResult result = runProgram(call("--frames 1 --backdrop --preview '" + folder.file("p.#.png") +
+                                               "' --contact-sheet '" + folder.file("sheet.png") + "'"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Image sheet = readImage(folder.file("sheet.png")), preview = readImage(folder.file("p.1.png"));
+  ASSERT_EQ(sheet.width, 64 + 2 * 4);
+  for (int y = 0; y != 36; ++y)
+    for (int x = 0; x != 64; ++x)
+      ASSERT_NEAR(sheet.at("G", 4 + x, 4 + y), preview.at("G", x, y), 2.5f / 255) << x << ", " << y;
+}
+
 TEST_F(TurntableVerb, WritesFramesPreviewsSheetAndStatistics) {
   const ProgramResult result =
       runProgram(call("--frames 8-11 --preview '" + folder.file("p/v.%03d.png") + "' --contact-sheet '" +

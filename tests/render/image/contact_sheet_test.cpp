@@ -46,6 +46,18 @@ TEST(ContactSheet, ShrinksFramesByTheirMean) {
   EXPECT_NEAR(sum / (37 * 37), 0.01, 1e-6);
 }
 
+TEST(ContactSheet, ShowsFramesInFrontOfTheirBackdrop) {
+  // Half opaque 0.2 in front of 0.6: 0.2 + 0.5 x 0.6, and nothing is left to see through.
+  Image frame = plain(16, 16, 0.2f);
+  for (float& alpha : frame.channels[3].values) alpha = 0.5f;
+  for (const char* name : {"backdrop.R", "backdrop.G", "backdrop.B"})
+    for (float& v : frame.add(name).values) v = 0.6f;
+  ContactSheet sheet(1, 16, 16, {.gap = 0});
+  sheet.set(0, frame);
+  EXPECT_FLOAT_EQ(sheet.image().at("G", 8, 8), 0.5f);
+  EXPECT_FLOAT_EQ(sheet.image().at("A", 8, 8), 1.0f);
+}
+
 TEST(ContactSheet, FitsItsWidthAndNeverEnlarges) {
   for (const int count : {1, 2, 5, 8, 48, 99, 100}) {
     const ContactSheet sheet(count, 960, 540);
