@@ -64,6 +64,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
 }
 
 std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, double mostBytes) const {
+  if (any()) require(!volume.isEmpty(), "objects and the ground stand in a volume that is not empty");
   std::vector<SurfaceObject> all;
   const auto image =
       texture.empty() ? nullptr

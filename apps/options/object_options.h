@@ -25,6 +25,7 @@ struct ObjectOptions {
   std::optional<double> groundHeight;
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
 
+  bool any() const { return !objects.empty() || !holdouts.empty() || ground; }
   /// Reads the files; null where there are no objects. @throws Error naming the file.
   std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, double mostBytes) const;
   /// Puts them into `picture`. @throws Error as `surfaces`.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "nephele/levelset/grid/large_buffer.h"
+#include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/volume/volume_parts.h"
 
@@ -14,6 +15,9 @@ namespace {
 
 std::shared_ptr<const BrickGrid> readFog(const std::string& path, const std::string& grid, Run& run,
                                          const BrickSink& made = {}) {
+  if (isMeshFile(path))
+    throw Error(fmt::format("{}: is a mesh, not a density; 'nephele cloud {} -o cloud.vdb' makes one of it",
+                            path, path));
   const VdbGrid vdb = readScalarGrid(path, grid);
   const VdbGridInfo info = describe(vdb);
   if (info.gridClass == VdbGridInfo::Class::levelSet)
@@ -65,6 +69,8 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   };
   VolumePart part;
   part.share = float(entryOf(options.densityScales, index, 1.0));
+  // No float tells what lies behind so little from what lies behind nothing.
+  if (reading.holdsObjects && part.share == 0) part.share = 1e-12f;
   BrickSink made;
   if (reading.coded && part.share == 1 && !options.hasOthers()) {
     part.coded = std::make_shared<CodedDensity>();

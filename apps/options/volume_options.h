@@ -35,6 +35,8 @@ struct VolumeReading {
   Shutter shutter;
   /// Codes a density that stands alone while it is read, see CodedDensity.
   bool coded = false;
+  /// Other things stand in the volumes: these keep their place, too thin to be seen, where their scale is 0.
+  bool holdsObjects = false;
 };
 
 /// Reads the volumes of `paths` as they are marched, all as one.

@@ -50,8 +50,9 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
-  RenderVolume volume = readVolumes(options.inputs, options.picture.volumes,
-                                    {options.picture.shutter, options.picture.readsCodes()}, run);
+  RenderVolume volume =
+      readVolumes(options.inputs, options.picture.volumes,
+                  {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
   PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   const Camera camera = picture.camera(volume);

@@ -62,8 +62,9 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   if (plan.frames.empty()) return run.note("no frame of --frames is in this share; nothing to do");
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
-  const RenderVolume volume = readVolumes({options.input}, options.picture.volumes,
-                                          {options.picture.shutter, options.picture.readsCodes()}, run);
+  const RenderVolume volume =
+      readVolumes({options.input}, options.picture.volumes,
+                  {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
   PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
   options.objects.addTo(picture, volume, run.memoryLimitBytes);

@@ -217,6 +217,11 @@ Mesh parse(const detail::MeshFile& file) {
 
 }  // namespace
 
+bool isMeshFile(const std::string& path) {
+  constexpr const char* kExtensions[] = {".obj", ".ply", ".stl", ".off", ".gltf", ".glb"};
+  return std::ranges::find(kExtensions, lowerExtension(path)) != std::end(kExtensions);
+}
+
 Mesh readMesh(const std::string& path) {
   const std::string content = detail::readWholeFile(path);
   const detail::MeshFile file{path, content};

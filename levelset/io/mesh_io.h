@@ -16,6 +16,9 @@ namespace nephele {
 /// hold.
 Mesh readMesh(const std::string& path);
 
+/// Whether the extension is one of those that `readMesh` reads, in any case.
+bool isMeshFile(const std::string& path);
+
 /// Writes .obj, .ply (binary little-endian) or .stl (binary, no attributes) by extension, whole or not at
 /// all.
 /// @throws Error naming the path; also for an unknown extension, coordinates that are not finite (.stl: as

@@ -14,6 +14,7 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/camera.h"
+#include "nephele/render/scene/holdout.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 
@@ -119,12 +120,71 @@ TEST_F(RenderLayers, AHoldoutInTheMiddleLeavesTheFrontHalf) {
   EXPECT_NEAR(readImage(folder.file("a.exr")).at("A", 16, 12), 0.5f, 0.01f);
 }
 
+TEST_F(RenderLayers, AHoldoutOfAnotherCameraIsRefused) {
+  const TemporaryFolder folder;
+  const std::string deep = folder.file("d.exr"), made = " --extinction 1 --light-quality draft --view 20,5 ";
+  ASSERT_EQ(runProgram(start() + folder.file("a.exr") + made + "--deep " + deep).exitCode, 0);
+  const auto hold = [&](const std::string& options) {
+    return runProgram(start() + folder.file("b.exr") + " --extinction 1 --light-quality draft --holdout " +
+                      deep + " " + options);
+  };
+  EXPECT_EQ(hold("--view 20,5").exitCode, 0);
+  // Turned by a tenth of a degree is 0.08 pixels at this size, and more than rounding makes of it.
+  for (const std::string other : {"--view 20.1,5", "--view 120,5", "--view 20,5 --fov 40"}) {
+    const ProgramResult result = hold(other);
+    EXPECT_EQ(result.exitCode, 1) << other;
+    EXPECT_NE(result.errors.find(deep + ": was made by another camera: at ("), std::string::npos)
+        << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+  }
+  // The same place, another width of view.
+  const std::string place = "--camera-position 0,0,9 --look-at 0,0,0 --extinction 1 --light-quality draft ";
+  ASSERT_EQ(runProgram(start() + folder.file("a.exr") + " " + place + "--fov 30 --deep " + deep).exitCode, 0);
+  const ProgramResult wider =
+      runProgram(start() + folder.file("b.exr") + " " + place + "--fov 31 --holdout " + deep);
+  EXPECT_EQ(wider.exitCode, 1);
+  // 2 tan(15 degrees) and 2 tan(15.5 degrees).
+  EXPECT_NE(wider.errors.find("its picture is 0.5359 wide at distance 1, this one 0.5546"), std::string::npos)
+      << wider.errors;
+}
+
+TEST_F(RenderLayers, ACameraThatLooksAlongItsOwnMinusZIsTheSame) {
+  // As other programs write it: the third column of worldToCamera has the other sign, and there is no width.
+  const TemporaryFolder folder;
+  const Camera camera = Camera::lookingAt({0, 0, 9}, {0, 0, 0}, {0, 1, 0}, {32, 24, 20.0f});
+  ImageCamera other = camera;
+  for (const std::size_t i : {2, 6, 10, 14}) other.worldToCamera[i] *= -1;
+  other.screenWidth = 1;
+  DeepImage wall;
+  wall.width = 32;
+  wall.height = 24;
+  wall.pixels.assign(32 * 24, {{9, 9, 1, {}}});
+  writeDeepExr(folder.file("wall.exr"), wall, other);
+  EXPECT_TRUE(readHoldout(folder.file("wall.exr"), camera));
+}
+
 // A square of edge 6 in the plane z, facing +z, with texture coordinates.
 std::string writeSquare(const TemporaryFolder& folder, const std::string& name, float z) {
   std::ofstream file(folder.file(name));
   for (const char* corner : {"-3 -3 ", "3 -3 ", "3 3 ", "-3 3 "}) file << "v " << corner << z << "\n";
   file << "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
   return folder.file(name);
+}
+
+TEST_F(RenderLayers, ObjectsAreSeenWhereTheDensityIsScaledToNothing) {
+  // The square at z = 0 across the line of sight, full in the light of a sun of irradiance pi: its colour.
+  const TemporaryFolder folder;
+  const std::string square = writeSquare(folder, "wall.obj", 0);
+  const ProgramResult result =
+      runProgram(start() + folder.file("a.exr") + " --density-scale 0 --ground --object " + square +
+                 " --camera-position 0,0,9 --look-at 0,0,0 --fov 20 --sun 0,0,3.1415927 --sky 0,0,0");
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  const Image image = readImage(folder.file("a.exr"));
+  for (const int x : {2, 16, 30}) EXPECT_NEAR(image.at("R", x, 12), 0.5f, 2e-3f) << x;
+  // Without objects it is as empty as before.
+  ASSERT_EQ(runProgram(start() + folder.file("a.exr") + " --density-scale 0").exitCode, 0);
+  const Image empty = readImage(folder.file("a.exr"));
+  for (const float alpha : empty.channel("A").values) ASSERT_EQ(alpha, 0.0f);
 }
 
 TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
@@ -228,7 +288,10 @@ TEST_F(RenderLayers, PathsTakeObjectsHoldoutsAndDepth) {
   // The marcher's picture of the same, within the noise of 64 paths per pixel: the opacity of a pixel is off
   // by 1/16 at most (one standard error), its mean over the picture by a thousandth.
   const TemporaryFolder folder, files;
-  ASSERT_EQ(runProgram(start() + files.file("a.exr") + " --deep " + files.file("d.exr")).exitCode, 0);
+  ASSERT_EQ(
+      runProgram(start() + files.file("a.exr") + " --view 40,10 --extinction 1 --deep " + files.file("d.exr"))
+          .exitCode,
+      0);
   const std::string scene = " --view 40,10 --ground --shadows deep --extinction 2 --aov Z,light --holdout " +
                             files.file("d.exr") + " --object " + writeSquare(files, "wall.obj", -1.2f);
   const auto make = [&](const std::string& name, const std::string& arguments) {

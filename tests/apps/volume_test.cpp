@@ -143,6 +143,17 @@ TEST_F(VolumeOptionsOfRender, RefusesListsThatDoNotFitTheVolumes) {
   EXPECT_EQ(render(file("whole.vdb"), "--temperature-scale 0").exitCode, 2);
 }
 
+TEST_F(VolumeOptionsOfRender, SendsMeshesToTheVerbThatMakesDensitiesOfThem) {
+  const std::string mesh = ownData("data/sphere_uv.obj");
+  for (const std::string verb : {"render", "turntable --frames 1"}) {
+    const ProgramResult result =
+        runProgram(verb + " " + mesh + " --quiet -o " + file(verb == "render" ? "a.exr" : "a.#.exr"));
+    EXPECT_EQ(result.exitCode, 1);
+    EXPECT_NE(result.errors.find("is a mesh, not a density; 'nephele cloud " + mesh), std::string::npos)
+        << result.errors;
+  }
+}
+
 TEST(VolumeData, RefusesVectorsAndLevelSetsAsDensities) {
   const std::string fluid = sharedData("volumes/blender_fluid_5_grids.vdb"),
                     cube = sharedData("volumes/cube_levelset.vdb");
