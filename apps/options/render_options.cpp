@@ -96,7 +96,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
       "Directions in which scattered light is solved for, and cells along the longest side: 24 and 72, 48 "
       "and "
-      "112, or 80 and 160. Time and memory grow with both.")
+      "84, or 80 and 160. Time and memory grow with both.")
       ->default_str("as --quality");
   addLength(app, "--step", options.step, "Longest step along a ray.", Sign::positive)
       ->default_str("one voxel");

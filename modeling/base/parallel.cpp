@@ -1,8 +1,11 @@
 #include "nephele/modeling/base/parallel.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <atomic>
 
 namespace nephele {
@@ -24,6 +27,11 @@ void parallelFor(std::size_t count, std::size_t grain,
         }
       },
       tbb::simple_partitioner{});
+}
+
+std::size_t threadCount() {
+  return std::min(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
+                  std::size_t(std::max(tbb::this_task_arena::max_concurrency(), 1)));
 }
 
 }  // namespace nephele

@@ -17,4 +17,7 @@ void parallelFor(std::size_t count, std::size_t grain,
                  const std::function<void(std::size_t, std::size_t)>& body,
                  const Progress& progress = silent());
 
+/// Threads that parallelFor uses at most.
+std::size_t threadCount();
+
 }  // namespace nephele

@@ -15,6 +15,7 @@
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/render/image/detail/exr_check.h"
 #include "nephele/render/image/detail/exr_header.h"
@@ -190,7 +192,10 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
     }
   }
   detail::writeWhole(output, [&](Imf::OStream& stream) {
-    Imf::OutputFile file(stream, header);
+    // Parts of the picture are compressed on all cores; OpenEXR's own threads are none until it is told.
+    const int threads = int(threadCount());
+    if (Imf::globalThreadCount() < threads && threads > 1) Imf::setGlobalThreadCount(threads);
+    Imf::OutputFile file(stream, header, threads);
     file.setFrameBuffer(frame);
     file.writePixels(image.height);
   });

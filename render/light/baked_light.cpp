@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/deep_shadow.h"
 #include "nephele/render/volume/finer_density.h"
 
@@ -51,6 +52,13 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
+  solver_ = {.longestSide = octaves.longestSide(), .order = octaves.order};
+  if (octaves.count > 1) {
+    moments_ = legendreMoments(medium.phase);
+    // All colours are solved for on the same lattice.
+    const float albedo = std::max({meanAlbedo.x, meanAlbedo.y, meanAlbedo.z});
+    solver_ = solver_.finerWhereDeep(volume, {scene.extinction, albedo, moments_});
+  }
   // Samples that are to be given back are, before the light takes its memory.
   if (readsCodes()) volume.coded();
   require(volume.hasSamples() || readsCodes(),
@@ -124,7 +132,7 @@ float BakedLight::darkColumn(const Vec3f& shadow) const {
   for (int c = 0; c != 3; ++c) least = std::min(least, shadow[c] * scene.extinctionColour[c]);
   // So is the rest where cells are thinned.
   const float seen = std::min(scene.extinction * least * (1 - albedo * largestMoment(medium.phase)),
-                              least * ScatteredLight::leastExtinction(*source, solverOptions()));
+                              least * ScatteredLight::leastExtinction(*source, solver_));
   return seen > 0 ? kDarkDepth / seen : std::numeric_limits<float>::infinity();
 }
 
@@ -221,42 +229,81 @@ void BakedLight::setColours(const RenderVolume& volume, float most) {
 void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
   const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3;
   const bool once = octaves.count == 1;
-  moments_ = once ? std::vector<float>{1.0f} : legendreMoments(medium.phase);
-  forward =
-      once ? ForwardLight(medium.phase)
-           : ForwardLight(medium.phase, moments_, albedo, solverOptions().degree(moments_), octaves.count);
+  forward = once ? ForwardLight(medium.phase)
+                 : ForwardLight(medium.phase, moments_, albedo, solver_.degree(moments_), octaves.count);
   scene.octaves = forward.count();
   for (int n = 0; n != scene.octaves; ++n) scene.attenuation[n] = forward.attenuation(n);
-  const std::size_t count = suns.size() + locals.size();
-  for (std::size_t light = 0; light <= count; ++light)
-    for (int c = 0; c != scene.colours; ++c) {
-      std::shared_ptr<const ScatteredLight> made;
-      if (light < count) {
-        if (!once) {
-          const Vec3f shadow =
-              light < suns.size() ? distant[light].shadow : lights.locals[light - suns.size()].shadow;
-          if (const int like = colourLike(c, shadow); like != c)
-            made = scattered[scattered.size() - std::size_t(c - like)];
-          else
-            made = scatteredLight(c, meanAlbedo[c], sourceOf(light, c), nameOf(light), progress);
-        }
-      } else if (lights.hasSky()) {
-        if (before && before->lights.sky == lights.sky && before->sky == sky &&
-            before->scene.colours == scene.colours)
-          made = before->scattered[before->scattered.size() - std::size_t(scene.colours - c)];
-        else if (const int like = colourLike(c, {1, 1, 1}); like != c && !sky)
-          made = scattered[scattered.size() - std::size_t(c - like)];
-        else
-          made = scatteredLight(c, once ? 0 : meanAlbedo[c],
-                                sky ? sourceOfSky(c) : ScatteredSource::evenSky(), "sky", progress);
+  const std::size_t lightCount = suns.size() + locals.size(), colours = std::size_t(scene.colours);
+  const auto shadowOf = [&](std::size_t light) {
+    return light < suns.size()  ? distant[light].shadow
+           : light < lightCount ? lights.locals[light - suns.size()].shadow
+                                : Vec3f{1, 1, 1};
+  };
+  std::vector<Solve> solves;
+  // For every light and colour that of `solves` which gives its part.
+  std::vector<std::optional<std::size_t>> from((lightCount + 1) * colours);
+  scattered.assign(from.size(), nullptr);
+  for (std::size_t light = 0; light <= lightCount; ++light) {
+    const bool isSky = light == lightCount;
+    if (isSky ? !lights.hasSky() : once) continue;
+    const bool isAsBefore = isSky && before && before->lights.sky == lights.sky && before->sky == sky &&
+                            before->scene.colours == scene.colours;
+    for (std::size_t c = 0; c != colours; ++c) {
+      const std::size_t place = light * colours + c;
+      if (isAsBefore) {
+        scattered[place] = before->scattered[before->scattered.size() - colours + c];
+        continue;
       }
-      keep(scattered, made);
+      const auto like = std::size_t(colourLike(int(c), shadowOf(light)));
+      if (like != c && !(isSky && sky)) {
+        from[place] = from[light * colours + like];
+        continue;
+      }
+      from[place] = solves.size();
+      solves.push_back({int(c), once ? 0 : meanAlbedo[int(c)],
+                        !isSky ? sourceOf(light, int(c))
+                        : sky  ? sourceOfSky(int(c))
+                               : ScatteredSource::evenSky()});
     }
-  if (source->hasEmission() && !once) scatterGlow(progress);
+  }
+  const std::size_t glowsFrom = solves.size();
+  if (source->hasEmission() && !once && meanAlbedo != Vec3f{})
+    for (int c = 0; c != scene.colours; ++c) solves.push_back({c, meanAlbedo[c], sourceOfGlow(c)});
+  solve(solves, progress);
+  for (std::size_t place = 0; place != from.size(); ++place)
+    if (from[place]) scattered[place] = solves[*from[place]].light;
+  for (std::size_t i = glowsFrom; i != solves.size(); ++i) glow.push_back(solves[i].light);
+  for (const auto* kept : {&scattered, &glow})
+    for (const auto& light : *kept)
+      if (light) {
+        toScattered.emplace(light->worldToLattice());
+        scene.scatteredSize = light->size();
+      }
 }
 
-ScatteredLight::Options BakedLight::solverOptions() const {
-  return {.longestSide = octaves.longestSide(), .order = octaves.order};
+// Some at the same time: threads of one would often wait for each other.
+void BakedLight::solve(std::vector<Solve>& solves, const Progress& progress) const {
+  if (solves.empty()) return;
+  progress.begin("scatter");
+  constexpr std::size_t kTogether = ScatteredLight::kMadeTogether;
+  const double share = 1 / double(solves.size());
+  for (std::size_t first = 0; first < solves.size(); first += kTogether)
+    parallelFor(std::min(kTogether, solves.size() - first), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = first + begin; i != first + end; ++i)
+        solves[i].light = std::make_shared<ScatteredLight>(
+            *source,
+            Scattering{scene.extinction * scene.extinctionColour[solves[i].colour], solves[i].albedo,
+                       moments_},
+            solves[i].from, solver_, SubProgress(progress, share * double(i), share * double(i + 1)));
+    });
+  int sweeps = 0;
+  float residual = 0;
+  for (const Solve& solved : solves) {
+    sweeps = std::max(sweeps, solved.light->sweeps());
+    residual = std::max(residual, solved.light->residual());
+  }
+  progress.count("sweeps", double(sweeps));
+  progress.count("light_residual", double(residual));
 }
 
 // The first colour in which light is scattered as in this one.
@@ -268,30 +315,12 @@ int BakedLight::colourLike(int colour, const Vec3f& shadow) const {
   return like;
 }
 
-void BakedLight::keep(std::vector<std::shared_ptr<const ScatteredLight>>& kept,
-                      std::shared_ptr<const ScatteredLight> light) {
-  if (light) {
-    toScattered.emplace(light->worldToLattice());
-    scene.scatteredSize = light->size();
-  }
-  kept.push_back(std::move(light));
-}
-
-// What is scattered of the light of what glows: a source of its own per optical depth, wherever there is
-// density.
-void BakedLight::scatterGlow(const Progress& progress) {
-  if (meanAlbedo == Vec3f{}) return;
-  for (int c = 0; c != 3; ++c) {
-    ScatteredSource glowing;
-    glowing.glow = [this, c, share = 1 / std::max(medium.extinctionColour[c], 1e-3f)](const Vec3f& world) {
-      return share * source->emissionPerDensity(world, c);
-    };
-    keep(glow, scatteredLight(c, meanAlbedo[c], glowing, "glow", progress));
-  }
-}
-
-const std::string& BakedLight::nameOf(std::size_t light) const {
-  return light < distant.size() ? distant[light].name : lights.locals[light - distant.size()].name;
+// Of what glows: a source of its own per optical depth, wherever there is density.
+ScatteredSource BakedLight::sourceOfGlow(int colour) const {
+  ScatteredSource result;
+  result.glow = [this, colour, share = 1 / std::max(medium.extinctionColour[colour], 1e-3f)](
+                    const Vec3f& world) { return share * source->emissionPerDensity(world, colour); };
+  return result;
 }
 
 // Irradiance per gain.
@@ -326,20 +355,6 @@ ScatteredSource BakedLight::sourceOfSky(int colour) const {
     return inflow;
   };
   return result;
-}
-
-// The light `from` somewhere in one colour.
-std::shared_ptr<const ScatteredLight> BakedLight::scatteredLight(int colour, float albedo,
-                                                                 const ScatteredSource& from,
-                                                                 const std::string& name,
-                                                                 const Progress& progress) const {
-  progress.begin("scatter " + name);
-  auto made = std::make_shared<ScatteredLight>(
-      *source, Scattering{scene.extinction * scene.extinctionColour[colour], albedo, moments_}, from,
-      solverOptions(), progress);
-  progress.count("sweeps", double(made->sweeps()));
-  progress.count("light_residual", double(made->residual()));
-  return made;
 }
 
 }  // namespace nephele::detail

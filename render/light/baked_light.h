@@ -59,9 +59,9 @@ struct BakedLight {
 
  private:
   // Of the phase function.
-  std::vector<float> moments_;
+  std::vector<float> moments_{1.0f};
+  ScatteredLight::Options solver_;
 
-  ScatteredLight::Options solverOptions() const;
   float columnPerDepth(const Vec3f& shadow) const;
   float darkColumn(const Vec3f& shadow) const;
   template <class Light, class Columns>
@@ -73,16 +73,18 @@ struct BakedLight {
   void code();
   void setColours(const RenderVolume& volume, float most);
   void scatter(const BakedLight* before, const Progress& progress);
-  void scatterGlow(const Progress& progress);
-  const std::string& nameOf(std::size_t light) const;
+  // What is solved for: light of one colour `from` somewhere.
+  struct Solve {
+    int colour;
+    float albedo;
+    ScatteredSource from;
+    std::shared_ptr<const ScatteredLight> light{};
+  };
+  void solve(std::vector<Solve>& solves, const Progress& progress) const;
   ScatteredSource sourceOf(std::size_t light, int colour) const;
   ScatteredSource sourceOfSky(int colour) const;
-  std::shared_ptr<const ScatteredLight> scatteredLight(int colour, float albedo, const ScatteredSource& from,
-                                                       const std::string& name,
-                                                       const Progress& progress) const;
+  ScatteredSource sourceOfGlow(int colour) const;
   int colourLike(int colour, const Vec3f& shadow) const;
-  void keep(std::vector<std::shared_ptr<const ScatteredLight>>& lights,
-            std::shared_ptr<const ScatteredLight> light);
 };
 
 }  // namespace nephele::detail

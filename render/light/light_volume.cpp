@@ -61,21 +61,22 @@ double reachedBricks(const std::vector<Vec3i>& occupied) {
   for (const Vec3i& brick : occupied) low = min(low, brick), high = max(high, brick);
   const Vec3i n = high - low + Vec3i{4, 4, 4};
   if (double(n.x) * n.y * n.z > kMostPlaces) return 16.0 * double(occupied.size());
+  const std::size_t along[3] = {std::size_t(n.x), std::size_t(n.y), std::size_t(n.z)};
+  const std::size_t stride[3] = {1, along[0], along[0] * along[1]};
+  std::vector<std::uint8_t> own(along[0] * along[1] * along[2]), reached;
+  // Three places are left behind the last along every axis.
+  for (const Vec3i& brick : occupied) {
+    const Vec3i at = brick - low;
+    own[std::size_t(at.x) * stride[0] + std::size_t(at.y) * stride[1] + std::size_t(at.z) * stride[2]] = 1;
+  }
   std::size_t most = 0;
   for (int w = 0; w != 3; ++w) {
-    std::vector<bool> reached(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
-    std::size_t count = 0;
-    for (const Vec3i& brick : occupied)
-      for (int k = 0; k != 16; ++k) {
-        Vec3i place = brick - low + Vec3i{1, 1, 1};
-        place[(w + 1) % 3] += k % 4 - 1;
-        place[(w + 2) % 3] += k / 4 - 1;
-        const std::size_t i =
-            (std::size_t(place.z) * std::size_t(n.y) + std::size_t(place.y)) * std::size_t(n.x) +
-            std::size_t(place.x);
-        if (!reached[i]) reached[i] = true, ++count;
-      }
-    most = std::max(most, count);
+    reached = own;
+    for (const std::size_t step : {stride[(w + 1) % 3], stride[(w + 2) % 3]})
+      // By one and by two places more: four in all.
+      for (const std::size_t by : {step, 2 * step})
+        for (std::size_t i = reached.size(); i-- > by;) reached[i] |= reached[i - by];
+    most = std::max(most, std::size_t(std::count(reached.begin(), reached.end(), std::uint8_t(1))));
   }
   return double(most);
 }
@@ -105,9 +106,11 @@ struct LightVolume::Sweep {
 
   Sweep(const RenderVolume& volume, const Vec3f& light)
       : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()) {
+    // Of axes that are as close but for rounding the last: samples lie side by side along the first.
+    constexpr float kRounding = 1 - 1e-6f;
     w = 0;
     for (int axis = 1; axis != 3; ++axis)
-      if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
+      if (std::fabs(light[axis]) >= kRounding * std::fabs(light[w])) w = axis;
     u = w == 0 ? 1 : 0;
     v = w == 2 ? 1 : 2;
     slopeU = light[u] / light[w];
@@ -165,19 +168,29 @@ struct LightVolume::Sweep {
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
           const std::uint16_t* from = coded->codes() + entry.first + first;
-          copyRows(countU, countV, rows, [&](int x, int y) {
-            return (float(from[x * sampleStride[u] + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
+          copySamples(from, countU, countV, rows, [unit = entry.unit](std::uint16_t code) {
+            return (float(code) - CodedBricks::kZero) * unit;
           });
         } else {
-          const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
-          copyRows(countU, countV, rows,
-                   [&](int x, int y) { return from[x * sampleStride[u] + y * sampleStride[v]]; });
+          copySamples(grid.brick(pool) + sampleOffset(0, 0, 0) + first, countU, countV, rows,
+                      [](float sample) { return sample; });
         }
         u1 = u2;
       }
       v1 = v2;
     }
     return true;
+  }
+
+  // The samples of a part of a patch from those of a brick.
+  template <class Sample, class Decode>
+  void copySamples(const Sample* from, int countU, int countV, float* rows, const Decode& decode) const {
+    const int across = sampleStride[u], down = sampleStride[v];
+    // Known to the compiler in two of three cases: then whole vectors are decoded.
+    if (across == 1)
+      copyRows(countU, countV, rows, [&](int x, int y) { return decode(from[x + y * down]); });
+    else
+      copyRows(countU, countV, rows, [&](int x, int y) { return decode(from[x * across + y * down]); });
   }
 
   // The samples at(x, y) of a part of a patch, whose rows are mostly whole bricks.
@@ -426,6 +439,24 @@ void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float>
         return coded_.at(place, at + Vec3i{x, y, z});
       });
   }
+}
+
+float LightVolume::leastColumnDensity(std::span<const Vec3f> world) const {
+  if (!(dark_ < INFINITY)) return 0;
+  Box around;
+  for (const Vec3f& point : world) around = around.including(worldToLattice_(point));
+  Vec3i first, last;
+  for (int axis = 0; axis != 3; ++axis) {
+    first[axis] = brickOf(int(std::floor(around.min[axis]))) - firstBrick_[axis];
+    last[axis] = brickOf(int(std::floor(around.max[axis]))) - firstBrick_[axis];
+  }
+  const BrickBox box{{}, brickCount_};
+  if (!box.covers(first) || !box.covers(last)) return 0;
+  for (int z = first.z; z <= last.z; ++z)
+    for (int y = first.y; y <= last.y; ++y)
+      for (int x = first.x; x <= last.x; ++x)
+        if (table_[box.numberOf({x, y, z})] != 1) return 0;
+  return dark_;
 }
 
 double LightVolume::estimateBytes(const RenderVolume& volume, const Options& options) {

@@ -81,6 +81,8 @@ class LightVolume {
   float columnDensity(const Vec3f& world) const;
   /// The same at as many points as there are `columns`.
   void columnDensities(std::span<const Vec3f> world, std::span<float> columns) const;
+  /// A lower bound of it between points: Options::dark where all around them is dark, else 0.
+  float leastColumnDensity(std::span<const Vec3f> world) const;
   std::size_t memoryBytes() const {
     return values_.size() * sizeof(float) + table_.size() * sizeof(std::int32_t) + coded_.memoryBytes();
   }

@@ -41,6 +41,8 @@ namespace {
 
 // Typical optical depth of a cell, beyond which it is thinned.
 constexpr float kDeepestCell = 2.0f;
+// Where cells are so many times as deep, they are smaller by this.
+constexpr float kFinerBeyond = 2.0f, kFiner = 1.3f;
 // Moments below this are not worth a degree.
 constexpr float kSmallMoment = 0.1f;
 
@@ -70,6 +72,7 @@ ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards
   source.columns = [&sun](std::span<const Vec3f> world, std::span<float> found) {
     sun.columnDensities(world, found);
   };
+  source.leastColumn = [&sun](std::span<const Vec3f> world) { return sun.leastColumnDensity(world); };
   source.towards = towards;
   return source;
 }
@@ -130,7 +133,7 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   detail::sampleBeam(volume, place, source, scattering.extinction * share_, lattice);
   if (source.glow)
     for (float& value : lattice.beam) value /= share_ * std::max(albedo_, 1e-6f);
-  while (2 * lattice.longest() > 3 * options.longestSide) lattice = detail::halved(lattice);
+  for (int i = 0; i != place.halvings; ++i) lattice = detail::halved(lattice);
 
   size_ = lattice.size;
   const float scale = 1 / lattice.voxels;
@@ -201,6 +204,17 @@ float ScatteredLight::meanAt(const Vec3f& world) const {
   return detail::LatticePoint(size_, worldToLattice_(world)).of(mean().data());
 }
 
+ScatteredLight::Options ScatteredLight::Options::finerWhereDeep(const RenderVolume& volume,
+                                                                const Scattering& scattering) const {
+  Options result = *this;
+  if (volume.isEmpty()) return result;
+  const SmoothScattering smooth(scattering.phase, scattering.albedo, degree(scattering.phase));
+  const float depth = scattering.extinction * smooth.share * volume.density().voxelSize() *
+                      detail::LatticePlacement(volume, longestSide).voxelsPerCell() * volume.typicalDensity();
+  if (depth > kFinerBeyond * kDeepestCell) result.longestSide = int(kFiner * float(longestSide));
+  return result;
+}
+
 // Cells are typically no denser than voxels.
 float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return 0;
@@ -211,12 +225,11 @@ float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options&
 
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
-  const detail::LatticePlacement place(volume, options.longestSide);
+  // Of the finer ones that deep cells need.
+  const detail::LatticePlacement place(volume, int(kFiner * float(options.longestSide)));
   const double moments = detail::momentCount(mostDegree(options.order));
-  double nodes = place.cells(), near = place.cellsNear(volume, detail::TransportSolver::kReach);
-  const double sampled = nodes;
-  for (int longest = place.longest(); 2 * longest > 3 * options.longestSide; longest /= 2)
-    nodes /= 8, near /= 8;
+  const double sampled = place.sampledCells(), kept = std::pow(0.125, place.halvings), nodes = kept * sampled,
+               near = kept * place.sampledCellsNear(volume, detail::TransportSolver::kReach);
   // Moments: the light, swept and turned, what is added up there, and the acceleration's, on all lattices;
   // beside them what the sweeps know of every cell.
   return {(7 * moments + 14) * sizeof(float) * near + 3 * sizeof(float) * sampled,

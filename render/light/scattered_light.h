@@ -33,6 +33,8 @@ struct ScatteredSource {
   std::function<float(const Vec3f&)> irradiance;
   /// The density on the beam's way to points, see LightVolume::columnDensities.
   std::function<void(std::span<const Vec3f> world, std::span<float> columns)> columns;
+  /// A lower bound of it between points, see LightVolume::leastColumnDensity; 0 where there is none.
+  std::function<float(std::span<const Vec3f> world)> leastColumn;
   /// Multiplies the extinction on that way.
   float shadow = 1.0f;
   /// Where the beam comes from: a direction towards it, or a place.
@@ -62,7 +64,7 @@ class ScatteredLight {
  public:
   struct Options {
     /// Nodes along the longest side, about: within a third of it, where there are as many voxels.
-    int longestSide = 112;
+    int longestSide = 84;
     /// Of the directions: 4, 6 or 8, see levelSymmetric. Moments are kept up to a degree of 2, 3 or 5, where
     /// the phase function has so many.
     int order = 6;
@@ -74,6 +76,8 @@ class ScatteredLight {
     /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
     /// of the directions.
     int degree(const std::vector<float>& phase) const;
+    /// These, with cells three quarters as wide where they would be so deep that thinning them shows.
+    Options finerWhereDeep(const RenderVolume& volume, const Scattering& scattering) const;
   };
 
   /// Cost: some 4 sweeps, each directions * nodes. @throws Error if an option is not useful or `scattering`
@@ -105,12 +109,14 @@ class ScatteredLight {
   /// Cells are never thinned so far that density 1 has less extinction than this.
   static float leastExtinction(const RenderVolume& volume, const Options& options);
 
+  /// So many are made at the same time where there are more than one.
+  static constexpr std::size_t kMadeTogether = 2;
+
   /// Bytes held while it is made, and afterwards.
   struct Bytes {
     double working = 0, kept = 0;
   };
   static Bytes estimateBytes(const RenderVolume& volume, const Options& options);
-  static Bytes estimateBytes(const RenderVolume& volume) { return estimateBytes(volume, Options{}); }
 
  private:
   void addBeam(detail::UnsetVector<float>& moments, const detail::ScatteringLattice& lattice,

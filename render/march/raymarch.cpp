@@ -48,7 +48,8 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
   double floats = double(Film::channelCount(options.aovs, lights.names().size()));
   // A dozen samples where there is something.
   if (options.deep) floats += 12 * sizeof(DeepSample) / sizeof(float);
-  const ScatteredLight::Bytes scattered = ScatteredLight::estimateBytes(volume);
+  const ScatteredLight::Bytes scattered = ScatteredLight::estimateBytes(
+      volume, {.longestSide = options.octaves.longestSide(), .order = options.octaves.order});
   // The sky's map may hold suns of its own.
   const int spots = lights.map ? MarchScene::kMostSuns - int(Lights::kMost) : 0;
   const double others = (options.surfaces ? double(options.surfaces->memoryBytes()) : 0.0) +
@@ -63,7 +64,8 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
                  double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume));
   const double finer =
       perNode > 1 ? perNode * double(volume.occupiedBricks().size()) * BrickGrid::kVolume * sizeof(float) : 0;
-  return others + shadows + deepShadowBytes(volume, lights) + finer + scattered.working +
+  return others + shadows + deepShadowBytes(volume, lights) + finer +
+         double(ScatteredLight::kMadeTogether) * scattered.working +
          3.0 * double(lights.names().size() + std::size_t(spots) + volume.hasEmission()) * scattered.kept +
          double(camera.window().width()) * camera.window().height() * floats * sizeof(float);
 }

@@ -33,6 +33,29 @@ void gather(const BlockTable& table, const Vec3i& brick, float* target) {
   }
 }
 
+const SampleStrides& stridesOf(const BlockTable& table) {
+  return table.order == BlockTable::Order::xFastest ? kOwnStrides : kZFastestStrides;
+}
+
+/// Whether a constant brick stands among others as if all were like it: no sample that it stores differs.
+bool isLikeAround(const BlockTable& table, const Vec3i& brick, float value) {
+  for (const BorderPart& part : kBorderParts) {
+    const std::int32_t code = table.codes.at(brick + part.side);
+    if (code <= 0) {
+      if (table.sign * table.constant(code) != value) return false;
+      continue;
+    }
+    const SampleStrides& strides = stridesOf(table);
+    const float* from =
+        table.block(code) + part.source.x * strides.x + part.source.y * strides.y + part.source.z * strides.z;
+    for (int z = 0; z < part.count.z; ++z)
+      for (int y = 0; y < part.count.y; ++y)
+        for (int x = 0; x < part.count.x; ++x)
+          if (!(table.sign * from[z * strides.z + y * strides.y + x * strides.x] == value)) return false;
+  }
+  return true;
+}
+
 constexpr std::int32_t kSampled = -1;
 
 /// Says for one row of bricks what stands there: kSampled, or a constant's number. Returns how many are
@@ -65,13 +88,9 @@ std::uint32_t classifyRow(const BlockTable& table, Beside beside, const Vec3i& f
   for (std::size_t x = 0; x < length; ++x) {
     entries[x] = own[x] > 0 ? 0 : -own[x];
     if (!mixed[x]) continue;
-    if (own[x] <= 0) {
-      // Beside a block: only needed if a sample that interpolation reads differs.
-      float samples[BrickGrid::kVolume];
-      gather(table, first + Vec3i{int(x), 0, 0}, samples);
-      const float value = table.sign * table.constant(own[x]);
-      if (std::all_of(samples, samples + BrickGrid::kVolume, [&](float s) { return s == value; })) continue;
-    }
+    // Beside a block: only needed if a sample that interpolation reads differs.
+    if (own[x] <= 0 && isLikeAround(table, first + Vec3i{int(x), 0, 0}, table.sign * table.constant(own[x])))
+      continue;
     entries[x] = kSampled;
     ++sampled;
   }

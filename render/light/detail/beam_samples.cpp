@@ -5,6 +5,7 @@
 #include "nephele/render/light/detail/beam_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <span>
@@ -16,6 +17,9 @@ namespace nephele::detail {
 
 namespace {
 
+// Behind so much nothing is left of a beam.
+constexpr float kDarkDepth = 12;
+
 // Samples along a cell, none of them at a voxel, where they would see none of what is between. Where cells
 // are wide a sample between eight voxels stands for these.
 int samplesAlong(const LatticePlacement& place) {
@@ -24,7 +28,7 @@ int samplesAlong(const LatticePlacement& place) {
 
 // Voxels from one sample to the next.
 float spacingOf(const LatticePlacement& place) {
-  return place.voxelsPerCell() / float(samplesAlong(place));
+  return place.voxelsPerSampledCell() / float(samplesAlong(place));
 }
 
 // Mean of what is left of a beam along a sample of optical depth `depth`, whose middle it sees through
@@ -68,20 +72,22 @@ DecodedBrick decoded(const RenderVolume& volume, const Vec3i& brick, bool needsB
 struct SampleRow {
   static constexpr int kMost = 2 * BrickGrid::kBrick;
 
-  // Cell of the first sample, and how many samples one cell has.
-  std::size_t cell;
+  // Sums of the cells along it, of which each has so many samples. In double, so that they do not depend on
+  // the order: mirrored light has the same bits.
+  double* sums;
   int perCell;
   // The first sample in voxels; the others follow at the samples' spacing.
   Vec3f voxel;
   std::span<const float> density;
 
-  std::size_t cellOf(std::size_t sample) const { return cell + sample / std::size_t(perCell); }
+  double& sumOf(std::size_t sample) const { return sums[sample / std::size_t(perCell)]; }
 };
 
-// Calls visit(row) for samples between the voxels, as many in every cell, where any is above 0.
-template <class Visit>
-void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const ScatteringLattice& lattice,
-                Visit&& visit) {
+// Means over the samples between the voxels of every cell, as many in each, of what add(row) adds where any
+// is above 0: of bricks that wants(brick).
+template <class Wants, class Add>
+void setMeans(const RenderVolume& volume, const LatticePlacement& place, const ScatteringLattice& lattice,
+              std::vector<float>& means, Wants&& wants, Add&& add) {
   const BrickGrid& grid = volume.density();
   const std::vector<Vec3i>& occupied = volume.occupiedBricks();
   const float spacing = spacingOf(place);
@@ -93,15 +99,19 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
     low[n] = int(std::floor(at[n]));
     share[n] = at[n] - float(low[n]);
   }
+  const double each = 1 / std::pow(double(perCell), 3);
   parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
     float density[SampleRow::kMost], nodes[DecodedBrick::kMost];
+    double sums[BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick];
     for (std::size_t i = begin; i != end; ++i) {
+      if (!wants(occupied[i])) continue;
       const Vec3i origin = (occupied[i] - place.firstBrick) * perBrick;
       const std::int32_t pool = grid.poolIndex(occupied[i]);
       const Interval& range = grid.ranges()[std::size_t(pool)];
       DecodedBrick brick{grid.brick(pool) + sampleOffset(0, 0, 0), BrickGrid::kWidth};
       if (!volume.hasSamples() && !range.isPoint()) brick = decoded(volume, occupied[i], low[0] < 0, nodes);
       std::fill_n(density, across, range.max);
+      std::fill_n(sums, perBrick * perBrick * perBrick, 0.0);
       for (int z = 0; z != across; ++z)
         for (int y = 0; y != across; ++y) {
           float most = range.max;
@@ -110,30 +120,29 @@ void forEachRow(const RenderVolume& volume, const LatticePlacement& place, const
             for (int n = 0; n != 4; ++n)
               rows[n] = brick.first + ((low[z] + n / 2) * brick.width + low[y] + n % 2) * brick.width;
             most = 0;
+            const auto mix = [](float a, float b, float ofB) { return (1 - ofB) * a + ofB * b; };
             for (int x = 0; x != across; ++x) {
               const auto along = [&](const float* row) {
-                const float a = std::max(row[low[x]], 0.0f);
-                return a + share[x] * (std::max(row[low[x] + 1], 0.0f) - a);
+                return mix(std::max(row[low[x]], 0.0f), std::max(row[low[x] + 1], 0.0f), share[x]);
               };
-              const float near0 = along(rows[0]), near1 = along(rows[1]), far0 = along(rows[2]),
-                          far1 = along(rows[3]);
-              const float near = near0 + share[y] * (near1 - near0), far = far0 + share[y] * (far1 - far0);
-              density[x] = near + share[z] * (far - near);
+              density[x] = mix(mix(along(rows[0]), along(rows[1]), share[y]),
+                               mix(along(rows[2]), along(rows[3]), share[y]), share[z]);
               most = std::max(most, density[x]);
             }
           }
           if (!(most > 0)) continue;
-          visit(SampleRow{lattice.index(origin.x, origin.y + y / perCell, origin.z + z / perCell), perCell,
-                          Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
-                          std::span<const float>(density, std::size_t(across))});
+          add(SampleRow{sums + ((z / perCell) * perBrick + y / perCell) * perBrick, perCell,
+                        Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
+                        std::span<const float>(density, std::size_t(across))});
+        }
+      const double* sum = sums;
+      for (int z = 0; z != perBrick; ++z)
+        for (int y = 0; y != perBrick; ++y) {
+          float* row = means.data() + lattice.index(origin.x, origin.y + y, origin.z + z);
+          for (int x = 0; x != perBrick; ++x) row[x] = float(each * *sum++);
         }
     }
   });
-}
-
-float samplesPerCell(const LatticePlacement& place) {
-  const int along = samplesAlong(place);
-  return float(along * along * along);
 }
 
 }  // namespace
@@ -144,17 +153,18 @@ LatticePlacement::LatticePlacement(const RenderVolume& volume, int longestSide) 
   bricks = Vec3i(box.size() * (1.0f / BrickGrid::kBrick)) + Vec3i{2, 2, 2};
   const int longest = std::max({bricks.x, bricks.y, bricks.z});
   cellsPerBrick = std::clamp((2 * longestSide + longest) / (2 * longest), 1, BrickGrid::kBrick);
+  for (int cells = longest * cellsPerBrick; 2 * cells > 3 * longestSide; cells = (cells + 1) / 2) ++halvings;
 }
 
 ScatteringLattice LatticePlacement::lattice() const {
-  return {bricks * cellsPerBrick, voxelsPerCell()};
+  return {bricks * cellsPerBrick, voxelsPerSampledCell()};
 }
 
-double LatticePlacement::cells() const {
+double LatticePlacement::sampledCells() const {
   return double(bricks.x) * bricks.y * bricks.z * std::pow(cellsPerBrick, 3);
 }
 
-double LatticePlacement::cellsNear(const RenderVolume& volume, int reach) const {
+double LatticePlacement::sampledCellsNear(const RenderVolume& volume, int reach) const {
   ScatteringLattice occupied(bricks, float(BrickGrid::kBrick));
   for (const Vec3i& brick : volume.occupiedBricks()) {
     const Vec3i at = brick - firstBrick;
@@ -173,11 +183,10 @@ double LatticePlacement::cellsNear(const RenderVolume& volume, int reach) const 
 }
 
 void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice) {
-  forEachRow(volume, place, lattice, [&](const SampleRow& row) {
-    for (std::size_t n = 0; n != row.density.size(); ++n) lattice.density[row.cellOf(n)] += row.density[n];
+  const auto all = [](const Vec3i&) { return true; };
+  setMeans(volume, place, lattice, lattice.density, all, [](const SampleRow& row) {
+    for (std::size_t n = 0; n != row.density.size(); ++n) row.sumOf(n) += double(row.density[n]);
   });
-  const float samples = samplesPerCell(place);
-  for (float& value : lattice.density) value /= samples;
 }
 
 void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const ScatteredSource& source,
@@ -186,7 +195,17 @@ void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const
   const BrickGrid& grid = volume.density();
   const float spacing = spacingOf(place), behind = extinction * source.shadow,
               perDensity = behind * grid.voxelSize() * spacing;
-  forEachRow(volume, place, lattice, [&](const SampleRow& row) {
+  const auto isLit = [&](const Vec3i& brick) {
+    if (!source.leastColumn) return true;
+    std::array<Vec3f, 8> corners;
+    // Of its voxels, which reach half a voxel beyond its nodes.
+    for (int corner = 0; corner != 8; ++corner)
+      corners[std::size_t(corner)] = grid.indexToWorld()(
+          Vec3f((brick + Vec3i{corner & 1, corner >> 1 & 1, corner >> 2}) * BrickGrid::kBrick) -
+          Vec3f{0.5f, 0.5f, 0.5f});
+    return behind * source.leastColumn(corners) < kDarkDepth;
+  };
+  setMeans(volume, place, lattice, lattice.beam, isLit, [&](const SampleRow& row) {
     const std::size_t count = row.density.size();
     Vec3f world[SampleRow::kMost];
     for (std::size_t n = 0; n != count; ++n)
@@ -197,9 +216,9 @@ void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const
     float before = -1, rho = -1, left = 0;
     for (std::size_t n = 0; n != count; ++n) {
       if (!(row.density[n] > 0)) continue;
-      float& beam = lattice.beam[row.cellOf(n)];
+      double& beam = row.sumOf(n);
       if (source.glow) {
-        beam += row.density[n] * source.glow(world[n]);
+        beam += double(row.density[n] * source.glow(world[n]));
         continue;
       }
       if (columns[n] != before || row.density[n] != rho) {
@@ -207,12 +226,11 @@ void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const
         rho = row.density[n];
         left = meanTransmittance(std::clamp(behind * before, 0.0f, 80.0f), std::min(perDensity * rho, 80.0f));
       }
-      beam += rho * source.irradiance(world[n]) / (4 * kPi) * left;
+      beam += double(rho * source.irradiance(world[n]) / (4 * kPi) * left);
     }
   });
-  const float samples = samplesPerCell(place);
   for (std::size_t i = 0; i != lattice.beam.size(); ++i)
-    if (lattice.density[i] > 0) lattice.beam[i] /= samples * lattice.density[i];
+    if (lattice.density[i] > 0) lattice.beam[i] /= lattice.density[i];
 }
 
 }  // namespace nephele::detail

@@ -11,18 +11,18 @@ namespace nephele::detail {
 /// Where the finest lattice of a volume lies: a brick of nothing around it.
 struct LatticePlacement {
   Vec3i firstBrick, bricks;
-  /// Cells along a brick, 1 to 8.
-  int cellsPerBrick = 1;
+  /// Cells along a brick, 1 to 8, while they are sampled; then so many times two and two become one.
+  int cellsPerBrick = 1, halvings = 0;
 
   /// `longestSide`: about so many cells along the longest side, within a third of it where bricks allow.
   LatticePlacement(const RenderVolume& volume, int longestSide);
-  float voxelsPerCell() const { return float(BrickGrid::kBrick) / float(cellsPerBrick); }
+  float voxelsPerSampledCell() const { return float(BrickGrid::kBrick) / float(cellsPerBrick); }
+  float voxelsPerCell() const { return voxelsPerSampledCell() * float(1 << halvings); }
   ScatteringLattice lattice() const;
-  /// Cells along the longest side, and all of them.
-  int longest() const { return std::max({bricks.x, bricks.y, bricks.z}) * cellsPerBrick; }
-  double cells() const;
-  /// At most so many of them are kept by CellRows for what is within reach of density.
-  double cellsNear(const RenderVolume& volume, int reach) const;
+  /// All that are sampled.
+  double sampledCells() const;
+  /// At most so many of these would be kept by CellRows for what is within reach of density.
+  double sampledCellsNear(const RenderVolume& volume, int reach) const;
 };
 
 /// Sets the lattice's densities: means of what the march reads between the voxels.

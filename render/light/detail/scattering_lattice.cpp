@@ -1,24 +1,30 @@
 #include "nephele/render/light/detail/scattering_lattice.h"
 
+#include <algorithm>
 #include <utility>
+
+#include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
 
 ScatteringLattice halved(const ScatteringLattice& fine) {
   const Vec3i n = fine.size;
   ScatteringLattice coarse({(n.x + 1) / 2, (n.y + 1) / 2, (n.z + 1) / 2}, 2 * fine.voxels);
-  for (int z = 0; z != n.z; ++z)
-    for (int y = 0; y != n.y; ++y)
-      for (int x = 0; x != n.x; ++x) {
-        const std::size_t from = fine.index(x, y, z), to = coarse.index(x / 2, y / 2, z / 2);
-        coarse.density[to] += fine.density[from];
-        coarse.beam[to] += fine.density[from] * fine.beam[from];
-      }
-  for (std::size_t i = 0; i != coarse.density.size(); ++i) {
-    if (!(coarse.density[i] > 0)) continue;
-    coarse.beam[i] /= coarse.density[i];
-    coarse.density[i] /= 8;
-  }
+  const std::size_t perSlice = std::size_t(coarse.size.x) * std::size_t(coarse.size.y);
+  parallelFor(std::size_t(coarse.size.z), 1, [&](std::size_t begin, std::size_t end) {
+    for (int z = 2 * int(begin); z != std::min(2 * int(end), n.z); ++z)
+      for (int y = 0; y != n.y; ++y)
+        for (int x = 0; x != n.x; ++x) {
+          const std::size_t from = fine.index(x, y, z), to = coarse.index(x / 2, y / 2, z / 2);
+          coarse.density[to] += fine.density[from];
+          coarse.beam[to] += fine.density[from] * fine.beam[from];
+        }
+    for (std::size_t i = begin * perSlice; i != end * perSlice; ++i) {
+      if (!(coarse.density[i] > 0)) continue;
+      coarse.beam[i] /= coarse.density[i];
+      coarse.density[i] /= 8;
+    }
+  });
   return coarse;
 }
 
@@ -65,18 +71,19 @@ std::vector<std::uint8_t> surroundings(const ScatteringLattice& lattice, int rea
   const Vec3i n = lattice.size;
   std::vector<std::uint8_t> now(lattice.density.size()), next(now.size());
   for (std::size_t i = 0; i != now.size(); ++i) now[i] = lattice.density[i] > 0;
-  const std::size_t strides[3] = {1, std::size_t(n.x), std::size_t(n.x) * std::size_t(n.y)};
-  for (int axis = 0; axis != 3; ++axis) {
-    std::fill(next.begin(), next.end(), std::uint8_t(0));
-    for (int z = 0; z != n.z; ++z)
-      for (int y = 0; y != n.y; ++y)
-        for (int x = 0; x != n.x; ++x) {
-          const std::size_t i = lattice.index(x, y, z);
-          if (!now[i]) continue;
-          const int at = Vec3i{x, y, z}[axis];
-          for (int d = -std::min(reach, at); d <= std::min(reach, n[axis] - 1 - at); ++d)
-            next[i + std::size_t(std::ptrdiff_t(d) * std::ptrdiff_t(strides[axis]))] = 1;
-        }
+  const std::size_t along[3] = {std::size_t(n.x), std::size_t(n.y), std::size_t(n.z)};
+  std::size_t stride = 1;
+  for (int axis = 0; axis != 3; stride *= along[axis++]) {
+    // Lines along the axis, side by side: what is `d` away from one place of them is one piece of memory.
+    const std::size_t whole = stride * along[axis];
+    std::copy(now.begin(), now.end(), next.begin());
+    for (std::size_t first = 0; first < now.size(); first += whole)
+      for (std::size_t d = stride; d <= std::min(std::size_t(reach) * stride, whole - stride); d += stride) {
+        const std::uint8_t* from = now.data() + first;
+        std::uint8_t* to = next.data() + first;
+        for (std::size_t i = 0; i != whole - d; ++i) to[i + d] |= from[i];
+        for (std::size_t i = 0; i != whole - d; ++i) to[i] |= from[i + d];
+      }
     std::swap(now, next);
   }
   return now;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr int kCoarsest = 24;
 // What is missing need not be known well.
-constexpr int kSweepsOfError = 4, kSweepsOfCoarsest = 40;
-constexpr float kToleranceOfError = 0.1f;
+constexpr int kSweepsOfError = 2, kSweepsOfCoarsest = 40;
+constexpr float kToleranceOfError = 0.2f;
 // Sweeps of coarser lattices cost little, and what they leave would have to be mended on finer ones.
 constexpr float kTightened = 0.1f;
 // What cells half as wide change is this many times what the error that is left is: 1 / (2^p - 1) times for

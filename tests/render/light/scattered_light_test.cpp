@@ -144,7 +144,7 @@ TEST(ScatteredLight, IsTheSameAtAnotherVoxelSize) {
 TEST(ScatteredLight, EstimatesItsMemory) {
   const RenderVolume volume(ball(1.0f, 0.02f));
   const ScatteredLight light(volume, scattering(2.5f, 0.98f), ScatteredSource::evenSky());
-  const ScatteredLight::Bytes bytes = ScatteredLight::estimateBytes(volume);
+  const ScatteredLight::Bytes bytes = ScatteredLight::estimateBytes(volume, {});
   EXPECT_LE(double(light.mean().size() * sizeof(float)), bytes.kept);
   EXPECT_GT(bytes.working, bytes.kept);
   EXPECT_LE(std::max({light.size().x, light.size().y, light.size().z}), 135);
