@@ -106,11 +106,9 @@ struct LightVolume::Sweep {
 
   Sweep(const RenderVolume& volume, const Vec3f& light)
       : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()) {
-    // Of axes that are as close but for rounding the last: samples lie side by side along the first.
-    constexpr float kRounding = 1 - 1e-6f;
     w = 0;
     for (int axis = 1; axis != 3; ++axis)
-      if (std::fabs(light[axis]) >= kRounding * std::fabs(light[w])) w = axis;
+      if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
     u = w == 0 ? 1 : 0;
     v = w == 2 ? 1 : 2;
     slopeU = light[u] / light[w];
@@ -168,29 +166,19 @@ struct LightVolume::Sweep {
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
           const std::uint16_t* from = coded->codes() + entry.first + first;
-          copySamples(from, countU, countV, rows, [unit = entry.unit](std::uint16_t code) {
-            return (float(code) - CodedBricks::kZero) * unit;
+          copyRows(countU, countV, rows, [&](int x, int y) {
+            return (float(from[x * sampleStride[u] + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
           });
         } else {
-          copySamples(grid.brick(pool) + sampleOffset(0, 0, 0) + first, countU, countV, rows,
-                      [](float sample) { return sample; });
+          const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
+          copyRows(countU, countV, rows,
+                   [&](int x, int y) { return from[x * sampleStride[u] + y * sampleStride[v]]; });
         }
         u1 = u2;
       }
       v1 = v2;
     }
     return true;
-  }
-
-  // The samples of a part of a patch from those of a brick.
-  template <class Sample, class Decode>
-  void copySamples(const Sample* from, int countU, int countV, float* rows, const Decode& decode) const {
-    const int across = sampleStride[u], down = sampleStride[v];
-    // Known to the compiler in two of three cases: then whole vectors are decoded.
-    if (across == 1)
-      copyRows(countU, countV, rows, [&](int x, int y) { return decode(from[x + y * down]); });
-    else
-      copyRows(countU, countV, rows, [&](int x, int y) { return decode(from[x * across + y * down]); });
   }
 
   // The samples at(x, y) of a part of a patch, whose rows are mostly whole bricks.
@@ -434,10 +422,16 @@ void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float>
       columns[n] = trilinear(values_.data() + std::size_t(table_[place]) * kVolume +
                                  std::size_t((at.z * kWidth + at.y) * kWidth + at.x),
                              p - Vec3f(cell), kWidth, kWidth * kWidth);
-    else
-      columns[n] = trilinear(p - Vec3f(cell), [&](int x, int y, int z) {
-        return coded_.at(place, at + Vec3i{x, y, z});
-      });
+    else {
+      // Codes are interpolated as they are: what they stand for is linear in them.
+      const CodedBricks::Entry& entry = coded_.entries()[place];
+      const std::uint16_t* first = coded_.codes() + entry.first + (at.z * kWidth + at.y) * kWidth + at.x;
+      columns[n] =
+          (trilinear(p - Vec3f(cell),
+                     [first](int x, int y, int z) { return float(first[(z * kWidth + y) * kWidth + x]); }) -
+           CodedBricks::kZero) *
+          entry.unit;
+    }
   }
 }
 

@@ -1,37 +1,36 @@
-// The distance is a maximum over axes, so it is exact when it is taken one axis at a time: the minimum over y
-// of max(|y|, d(y)) only needs d to be known along the axes done before.
+// Twice through the table, forwards and backwards: each time an entry looks at those of its neighbours that
+// were done before it (Borgefors' distance transform, 1986; exact for the largest of the axes).
 #include "nephele/render/volume/detail/brick_distances.h"
 
 #include <algorithm>
 
-#include "nephele/modeling/base/parallel.h"
-
 namespace nephele::detail {
 
 void spreadDistances(std::vector<std::uint8_t>& distances, const Vec3i& n) {
-  const std::size_t stride[3] = {1, std::size_t(n.x), std::size_t(n.x) * n.y};
-  for (int axis = 0; axis != 3; ++axis) {
-    const int along = n[axis], a = (axis + 1) % 3, b = (axis + 2) % 3;
-    parallelFor(std::size_t(n[b]), 4, [&](std::size_t begin, std::size_t end) {
-      std::vector<int> line(along), nearest(along);
-      for (std::size_t j = begin; j != end; ++j)
-        for (int i = 0; i != n[a]; ++i) {
-          std::uint8_t* start = distances.data() + j * stride[b] + std::size_t(i) * stride[a];
-          for (int k = 0; k != along; ++k) line[k] = start[std::size_t(k) * stride[axis]];
-          // Distances of neighbours in the plane already done differ freely, so each entry looks as far as it
-          // can improve.
-          for (int k = 0; k != along; ++k) {
-            int best = line[k];
-            for (int step = 1; step < best; ++step) {
-              if (k - step >= 0) best = std::min(best, std::max(step, line[k - step]));
-              if (k + step < along) best = std::min(best, std::max(step, line[k + step]));
-            }
-            nearest[k] = best;
-          }
-          for (int k = 0; k != along; ++k) start[std::size_t(k) * stride[axis]] = std::uint8_t(nearest[k]);
+  const auto row = std::ptrdiff_t(n.x), plane = row * n.y;
+  // With an entry before and behind.
+  std::vector<std::uint8_t> near(std::size_t(n.x) + 2);
+  constexpr std::uint8_t kMost = 255;
+  for (const int way : {1, -1})
+    for (int k = 0; k != n.z; ++k)
+      for (int j = 0; j != n.y; ++j) {
+        const int z = way > 0 ? k : n.z - 1 - k, y = way > 0 ? j : n.y - 1 - j;
+        std::uint8_t* own = distances.data() + z * plane + y * row;
+        std::fill(near.begin(), near.end(), kMost);
+        const auto look = [&](const std::uint8_t* other) {
+          for (int x = 0; x != n.x; ++x)
+            near[std::size_t(x) + 1] = std::min(near[std::size_t(x) + 1], other[x]);
+        };
+        if (j > 0) look(own - way * row);
+        for (int side = -1; k > 0 && side <= 1; ++side)
+          if (y + side >= 0 && y + side < n.y) look(own - way * plane + side * row);
+        for (int i = 0, x = way > 0 ? 0 : n.x - 1; i != n.x; ++i, x += way) {
+          const std::uint8_t* there = near.data() + x;
+          std::uint8_t least = std::min({there[0], there[1], there[2]});
+          if (i > 0) least = std::min(least, own[x - way]);
+          own[x] = std::min(own[x], std::uint8_t(std::min(int(least) + 1, int(kMost))));
         }
-    });
-  }
+      }
 }
 
 }  // namespace nephele::detail
