@@ -82,6 +82,21 @@ bool isScalar(const openvdb::GridBase& grid) {
   return detail::valuesOf(grid) == VdbValues::scalar;
 }
 
+/// What readers refuse is not written.
+void requireReadableTexts(const std::string& path, const openvdb::GridBase& grid) {
+  const auto check = [&](std::string_view what, std::size_t size) {
+    require(size <= std::size_t(detail::kLongestText),
+            fmt::format("{}: grid {}: {} has {} bytes, where {} are the most", path,
+                        detail::displayName(grid), what, size, detail::kLongestText));
+  };
+  for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
+    const std::string key = printable(entry->first, 80);
+    check("a name in its metadata, '" + key + "',", entry->first.size());
+    check(entry->first == openvdb::GridBase::META_GRID_NAME ? "its name" : "its metadata '" + key + "'",
+          entry->second->size());
+  }
+}
+
 }  // namespace
 
 bool isVolumeFile(const std::string& path) {
@@ -155,6 +170,7 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
       copy->removeMeta(key);
       copy->insertMeta(key, openvdb::StringMetadata(value));
     }
+    requireReadableTexts(path, *copy);
     labelled.push_back(copy);
   }
   OutputFile output(path);

@@ -124,7 +124,8 @@ VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)
 /// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path, also for
-/// grids of points, whose values are not read; no partial file stays.
+/// grids of points, whose values are not read, and texts over 64 MiB, which readers refuse; no partial file
+/// stays.
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
                   const std::map<std::string, std::string>& metadata);
 

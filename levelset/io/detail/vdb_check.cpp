@@ -58,9 +58,6 @@ const ValueLayout* layoutOf(const openvdb::GridBase& grid) {
   return nullptr;
 }
 
-// Texts that people wrote are far shorter; OpenVDB holds each twice while it reads.
-constexpr std::int64_t kLongestText = std::int64_t{64} << 20;
-
 void requireTextSize(std::int64_t size) {
   if (size > kLongestText)
     throw Error(fmt::format("a text of {} bytes, where {} are the most", size, kLongestText));

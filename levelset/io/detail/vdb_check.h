@@ -13,6 +13,10 @@ namespace nephele::detail {
 // the file can hold; OpenVDB itself trusts them. Each function begins at the present position and returns to
 // it. All throw Error, without the path.
 
+/// The longest text of a file that is read, in bytes. Those that people wrote are far shorter; OpenVDB holds
+/// each twice while it reads.
+inline constexpr std::int64_t kLongestText = std::int64_t{64} << 20;
+
 /// Names and values of metadata: lengths that do not fit are found before anything is allocated for them.
 /// What tells where delayed loading finds its blocks is hidden from OpenVDB, which would trust its contents.
 void checkMetadata(FileBytes& bytes);

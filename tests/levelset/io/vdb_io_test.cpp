@@ -206,6 +206,26 @@ TEST(VdbIo, RefusesMetadataWithoutAName) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
+// As many bytes as a reader takes, docs/limits.md has the number, are written and read.
+TEST(VdbIo, RefusesToWriteTextsThatAreTooLongToBeRead) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.vdb");
+  const std::string most(std::size_t{64} << 20, 'x'), tooLong = most + 'x';
+  const auto write = [&](const std::string& name, const std::string& key, const std::string& value) {
+    return errorOf([&] {
+      writeVdbFile(path, {toVdb(smallGrid(0.0f, 1.0f), {name, Class::fogVolume})}, {{key, value}});
+    });
+  };
+  const std::string shown = "'" + std::string(77, 'x') + "...'",
+                    size = "has 67108865 bytes, where 67108864 are the most";
+  EXPECT_EQ(write("a\n", "note\n", tooLong), path + ": grid 'a\\n': its metadata 'note\\n' " + size);
+  EXPECT_EQ(write("a", tooLong, "1"), path + ": grid 'a': a name in its metadata, " + shown + ", " + size);
+  EXPECT_EQ(write(tooLong, "note", "1"), path + ": grid " + shown + ": its name " + size);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_EQ(write("a", "note", most), "no error");
+  EXPECT_EQ(readVdbFile(path).size(), 1u);
+}
+
 TEST(VdbIo, RefusesTwoGridsOfOneNameInOneLine) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.vdb");
