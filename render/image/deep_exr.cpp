@@ -71,7 +71,8 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageC
         pointers[0][x] = reinterpret_cast<const char*>(row[x].empty() ? nullptr : &row[x][0].z);
         pointers[1][x] = reinterpret_cast<const char*>(row[x].empty() ? nullptr : &row[x][0].zBack);
         for (std::size_t c = 0; c != 4; ++c)
-          pointers[2 + c][x] = reinterpret_cast<const char*>(halves.data() + halves.size() + c);
+          pointers[2 + c][x] =
+              reinterpret_cast<const char*>(row[x].empty() ? nullptr : halves.data() + halves.size() + c);
         for (const DeepSample& s : row[x])
           for (const float value : {s.alpha, s.colour.x, s.colour.y, s.colour.z}) halves.emplace_back(value);
       }

@@ -60,8 +60,9 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
   const auto away = [&](const Vec3f& node) {
     if (!viewpoint.place) return forward;
     const Vec3f way = node - eye;
+    // From where the square of the way is beyond a float, nothing is seen.
     const float far = length(way);
-    return far > 0 ? way * (1 / far) : Vec3f{0, 0, 1};
+    return far > 0 && std::isfinite(far) ? way * (1 / far) : Vec3f{0, 0, 1};
   };
   const float ofBeam = share_ < 1 ? (1 - smoothShare_) / (1 - share_) : 0.0f;
   // What L is made of, and without the beam.

@@ -171,11 +171,14 @@ TEST(RenderBadInput, InactiveTilesOfFogAreNothing) {
 TEST(RenderBadInput, CamerasFarAwaySeeNothing) {
   const TemporaryFolder folder;
   const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid&) {});
-  const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr") +
-                                          " --size 16x12 --camera-position 0,3e9,9 --look-at 0,3e9,0");
-  ASSERT_EQ(result.exitCode, 0) << result.errors;
-  const Image image = readImage(folder.file("a.exr"));
-  for (const float alpha : image.channel("A").values) EXPECT_EQ(alpha, 0.0f);
+  for (const char* camera : {"0,3e9,9 --look-at 0,3e9,0", "0,3e30,9 --look-at 0,3e30,0",
+                             "0,3e38,0 --look-at 0,0,0 --up 1,0,0", "0,0,9 --look-at 3e38,0,9"}) {
+    const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr") +
+                                            " --overwrite --size 16x12 --camera-position " + camera);
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+    const Image image = readImage(folder.file("a.exr"));
+    for (const float alpha : image.channel("A").values) EXPECT_EQ(alpha, 0.0f) << camera;
+  }
 }
 
 void writeMovingBall(const std::string& path, float speed, bool hasTile) {

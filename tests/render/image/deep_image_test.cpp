@@ -120,6 +120,16 @@ TEST(DeepImage, IsWrittenAndReadAgain) {
   EXPECT_THROW(readDeepExr(folder.file("cut.exr")), Error);
 }
 
+// Under UndefinedBehaviorSanitizer: rows of nothing have no memory.
+TEST(DeepImage, MayHoldNothing) {
+  const TemporaryFolder folder;
+  const DeepImage image{.width = 3, .height = 2, .pixels = std::vector<std::vector<DeepSample>>(6)};
+  writeDeepExr(folder.file("a.exr"), image, ImageCamera{});
+  const DeepImage read = readDeepExr(folder.file("a.exr"));
+  EXPECT_EQ(read.pixels.size(), 6u);
+  EXPECT_EQ(read.sampleCount(), 0u);
+}
+
 TEST(DeepImage, IsDescribedByItsSamples) {
   DeepImage image{.width = 3, .height = 2, .pixels = std::vector<std::vector<DeepSample>>(6)};
   image.pixels[1] = {{.z = 2, .zBack = 3, .alpha = 0.5f, .colour = {0.25f, 0, 0}}};
