@@ -105,6 +105,21 @@ CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, d
       ->default_str(fmt::format("{:g}", target));
 }
 
+CLI::Option* addPercent(CLI::App& app, const std::string& name, double& target, double low, double high,
+                        const std::string& description) {
+  auto* option = app.add_option_function<std::string>(
+      name,
+      [&target, name, low, high](const std::string& text) {
+        const auto value = parseNumber(std::string_view(text).substr(0, text.size() - text.ends_with('%')));
+        if (!value || *value < low || *value > high)
+          refuseValue(name, text, fmt::format("{:g}% to {:g}%", low, high));
+        target = *value / 100;
+      },
+      description);
+  option->type_name("PERCENT");
+  return option->default_str(fmt::format("{:g}%", 100 * target));
+}
+
 CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
                          double high, const std::string& description) {
   return addNumber(

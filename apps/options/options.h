@@ -54,6 +54,9 @@ CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& he
 /// Declares --size and --view of a picture that `preview` asks for.
 void addPreviewFrame(CLI::App& app, CLI::Option* preview, int& width, int& height, float& azimuthDegrees,
                      float& elevationDegrees);
+/// A share in percent, with or without the sign, in [low, high]; `target` is the share itself.
+CLI::Option* addPercent(CLI::App& app, const std::string& name, double& target, double low, double high,
+                        const std::string& description);
 /// As addNumber, for a number that need not be given.
 CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<double>& target, double low,
                          double high, const std::string& description);

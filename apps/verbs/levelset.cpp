@@ -35,6 +35,8 @@ void bindOptions(CLI::App& app, LevelsetOptions& options) {
                                 ->excludes(resolution);
   addNumber(app, "--half-width", options.conversion.halfWidthVoxels, 1, 1000,
             "Voxels on either side of the surface that hold distances.");
+  addPercent(app, "--max-volume-error", options.conversion.mostVolumeError, 1e-6, 100,
+             "Fail where the volume differs from that of the mesh by this share; from 1 % on it is said.");
   addRepair(app, options.repair.mode);
   addSubdivide(app, options.subdivide);
 }

@@ -19,6 +19,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "nephele/levelset/mesh/detail/mesh_holes.h"
@@ -273,19 +274,21 @@ class Ladder {
       const double voxel = *options_.voxelSize / side;
       coarser = std::clamp(voxel / options_.wrapAlpha, 1.0, 1 / options_.wrapAlpha);
     }
-    const double alphaShare = options_.wrapAlpha * coarser, offsetShare = options_.wrapOffset * coarser;
-    const double alpha = alphaShare * side, offset = offsetShare * side;
-    refuseThinShell(alpha, offset);
-    const Mesh wrap = detail::wrapped(result_.mesh, alpha, offset, progress_);
-    const double thickness = meanThickness(wrap);
-    const bool isSheet = isShell(offset, thickness);
-    if (isSheet) requireHeld(offset, thickness);
-    result_.mesh = detail::withVertexAttributesOf(result_.mesh, wrap);
+    const double fineAlpha = options_.wrapAlpha * coarser * side,
+                 fineOffset = options_.wrapOffset * coarser * side;
+    const Wrap wrap = chosenWrap(fineAlpha, fineOffset);
+    const double alpha = wrap.factor * fineAlpha, offset = wrap.factor * fineOffset;
+    const bool isSheet = isShell(wrap, fineOffset);
+    if (isSheet) requireHeld(offset, wrap.thickness);
+    result_.mesh = detail::withVertexAttributesOf(result_.mesh, wrap.mesh);
     // What was done before does not show in the wrap.
     result_.repairs.clear();
-    report(
-        fmt::format("wrapped with alpha {:.3g} ({:.2g} % of the longest side), offset {:.3g} ({:.2g} %): {}",
-                    alpha, 100 * alphaShare, offset, 100 * offsetShare, why));
+    report(fmt::format(
+        "wrapped with alpha {:.3g} ({:.2g} % of the longest side), offset {:.3g} ({:.2g} %): {}{}", alpha,
+        100 * alpha / side, offset, 100 * offset / side, why,
+        wrap.factor > 1 ? "; a finer wrap would enter what is open, and be a shell too thin for "
+                          "the voxels"
+                        : ""));
     progress_.check();
     if (isSheet)
       report(
@@ -297,21 +300,51 @@ class Ladder {
   // A shell on both sides of a sheet holds half of its own area times its thickness; a solid far more.
   static double meanThickness(const Mesh& closed) { return 2 * signedVolume(closed) / surfaceArea(closed); }
 
-  // Whether a wrap of that offset is a shell around an open surface.
-  bool isShell(double offset, double thickness) const {
-    return !result_.before.closed() && thickness < kMostOfAShell * 2 * offset;
+  struct Wrap {
+    Mesh mesh;
+    double thickness;
+    /// Coarser than asked for.
+    double factor;
+  };
+
+  // Whether a wrap is a shell around an open surface.
+  bool isShell(const Wrap& wrap, double fineOffset) const {
+    return !result_.before.closed() && wrap.thickness < kMostOfAShell * 2 * wrap.factor * fineOffset;
   }
 
-  // A wrap takes seconds. What balls of a coarser one pass through, those of a finer pass through, so that a
-  // coarse one tells of a shell ahead.
-  void refuseThinShell(double alpha, double offset) const {
-    constexpr double kCoarse = 4;
+  // Whether the coarser wrap holds more than a shell of its own thickness where `shell` is one.
+  static bool isFuller(const Wrap& coarser, const Wrap& shell) {
+    constexpr double kFar = 2;
+    return signedVolume(coarser.mesh) > kFar * coarser.factor / shell.factor * signedVolume(shell.mesh);
+  }
+
+  // The finest wrap that is no shell too thin for the voxels. Coarse ones take a small share of the time, and
+  // close what finer ones enter: a coarse one that is a shell tells of a shell ahead, and one that is a solid
+  // is what is left where a finer one is a shell.
+  Wrap chosenWrap(double alpha, double offset) const {
     const double side = static_cast<double>(result_.before.box.longestSide());
-    const bool mayBeThin = options_.voxelSize && 2 * offset < *options_.voxelSize;
-    if (result_.before.closed() || !mayBeThin || kCoarse * alpha > side) return;
-    const double thickness =
-        meanThickness(detail::wrapped(result_.mesh, kCoarse * alpha, kCoarse * offset, progress_));
-    if (isShell(kCoarse * offset, thickness)) requireHeld(offset, thickness - 2 * (kCoarse - 1) * offset);
+    const bool mayBeThin = !result_.before.closed() && options_.voxelSize && 2 * offset < *options_.voxelSize;
+    std::optional<Wrap> solid;
+    bool isHeld = !mayBeThin;
+    for (const double factor : {4.0, 2.0, 1.0}) {
+      if (factor > 1 && (isHeld || factor * alpha > side)) continue;
+      // Their areas, and so their times, go with the square.
+      const double begin = mayBeThin && factor < 4 ? (factor == 2 ? 0.05 : 0.24) : 0;
+      const SubProgress part(progress_, begin, factor == 4 ? 0.05 : factor == 2 ? 0.24 : 1);
+      Wrap wrap{detail::wrapped(result_.mesh, factor * alpha, factor * offset, part), 0, factor};
+      wrap.thickness = meanThickness(wrap.mesh);
+      if (factor == 1 && isHeld) return wrap;
+      if (isShell(wrap, offset)) {
+        if (solid && isFuller(*solid, wrap)) return *std::move(solid);
+        requireHeld(offset, wrap.thickness - 2 * (factor - 1) * offset);
+        isHeld = true;
+        solid.reset();
+        if (factor == 1) return wrap;
+      } else {
+        solid = std::move(wrap);
+      }
+    }
+    return *std::move(solid);
   }
 
   void requireHeld(double offset, double thickness) const {

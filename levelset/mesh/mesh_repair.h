@@ -71,7 +71,8 @@ struct MeshRepairOptions {
   double wrapAlpha = 1.0 / 100;
   double wrapOffset = 1.0 / 600;
   /// Edge of the voxels that the mesh is for, world units. Alpha is then no finer than they are, the offset
-  /// in proportion, and an open surface whose wrap is a shell that they cannot hold is refused.
+  /// in proportion. Where the wrap of an open surface would be a shell that they cannot hold, one up to four
+  /// times as coarse that is a solid takes its place; where there is none, the mesh is refused.
   std::optional<double> voxelSize{};
 };
 

@@ -28,7 +28,8 @@ namespace nephele {
 
 namespace {
 
-constexpr double kVolumeTolerance = 0.01;
+// Nothing is said of less: any shape loses some of it to its curvature.
+constexpr double kWorthANote = 0.01, kSurfaceWorthANote = 0.02;
 
 /// The share of a voxel that is inside, by its signed distance in voxels, positive inside; 0 below -1, 1
 /// above 1.
@@ -37,9 +38,8 @@ double insideShare(double u) {
   return (4.0 * narrow - wide) / 3.0;
 }
 
-/// What is wrong with the volume, and what to do.
-[[noreturn]] void failThin(const Mesh& mesh, const VoxelGrid<float>& grid, const std::string& what,
-                           double better) {
+/// By how much, where, and what to do.
+std::string thinText(const Mesh& mesh, const VoxelGrid<float>& grid, const std::string& what, double better) {
   std::string where;
   if (const auto thin = detail::thinPlace(grid)) {
     // Marching cubes keep walls of two voxels.
@@ -50,46 +50,53 @@ double insideShare(double u) {
                         thin->thickness > kKnown ? fmt::format("about {:.1f} voxels thick", thin->thickness)
                                                  : "thinner than a voxel");
   }
-  throw Error(fmt::format(
-      "level set: {}: the shape is too thin for a voxel size of {:.4g}{}; try resolution {:.0f} (voxel size "
-      "{:.4g})",
-      what, grid.voxelSize(), where, std::ceil(boundingBox(mesh).longestSide() / better), better));
+  return fmt::format(
+      "{}: the shape is too thin for a voxel size of {:.4g}{}; try resolution {:.0f} (voxel "
+      "size {:.4g})",
+      what, grid.voxelSize(), where, std::ceil(boundingBox(mesh).longestSide() / better), better);
 }
 
-/// Walls of just under half a voxel have the right volume in the sum of shares, and next to none as a
-/// surface.
-void checkSurface(const Mesh& mesh, const VoxelGrid<float>& grid, double gridVolume) {
-  constexpr double kMostLost = 0.1;
+/// Compares the volumes of the sum of shares and of marching cubes with `solid`. Walls of just under half a
+/// voxel have the right volume in the former, and next to none as a surface.
+void judge(const Mesh& mesh, const VoxelGrid<float>& grid, double gridVolume, double solid,
+           const MeshToLevelSetOptions& options, const Progress& progress) {
   const double surfaceVolume = detail::isosurfaceVolume(grid);
-  const double lost = 1 - surfaceVolume / gridVolume;
-  if (std::abs(lost) < kMostLost) return;
-  failThin(mesh, grid,
-           fmt::format("its surface encloses a volume of {:.4g}, the mesh one of {:.4g} ({:.0f} % lost)",
-                       surfaceVolume, gridVolume, 100 * lost),
-           grid.voxelSize() / 2);
+  const double gridError = std::abs(gridVolume / solid - 1),
+               surfaceError = std::abs(surfaceVolume / solid - 1);
+  const double most = options.mostVolumeError, error = std::max(gridError, surfaceError);
+  // Marching cubes cut off what is curved, too, which falls with the voxels and is no defect of the grid.
+  if (error < most && gridError < kWorthANote && surfaceError < kSurfaceWorthANote) return;
+  // The error of a shape that is thin for its voxels falls with the square of their size.
+  const double wanted = std::min(most, kWorthANote);
+  const double better = options.voxelSize * std::min(0.5, std::sqrt(0.5 * wanted / error));
+  const std::string volumes =
+      gridError >= std::min(most, kWorthANote)
+          ? fmt::format("it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart", gridVolume,
+                        solid, 100 * gridError)
+          : fmt::format("its surface encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart",
+                        surfaceVolume, solid, 100 * surfaceError);
+  if (error >= most)
+    throw Error("level set: " +
+                thinText(mesh, grid, fmt::format("{}, {:g} % allowed)", volumes, 100 * most), better));
+  progress.note("the level set is not quite the mesh: " + thinText(mesh, grid, volumes + ")", better));
 }
 
-void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, double voxelSize, const Progress& progress) {
-  const double meshVolume = signedVolume(mesh);
-  const double gridVolume = enclosedVolume(grid);
-  if (std::abs(gridVolume / meshVolume - 1.0) < kVolumeTolerance) return checkSurface(mesh, grid, gridVolume);
+void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, const MeshToLevelSetOptions& options,
+                 const Progress& progress) {
+  const double meshVolume = signedVolume(mesh), gridVolume = enclosedVolume(grid);
+  const double tolerance = std::min(options.mostVolumeError, kWorthANote);
+  if (std::abs(gridVolume / meshVolume - 1.0) < tolerance)
+    return judge(mesh, grid, gridVolume, meshVolume, options, progress);
   // Triangles of parts that overlap count the overlap twice; the solid they bound counts it once.
   progress.begin("volume of the solid");
   const double solid = solidVolume(mesh);
-  const double error = std::abs(gridVolume / solid - 1.0);
-  if (error < kVolumeTolerance) {
-    checkSurface(mesh, grid, gridVolume);
+  judge(mesh, grid, gridVolume, solid, options, progress);
+  constexpr double kOverlap = 0.005;
+  if (std::abs(meshVolume / solid - 1) > kOverlap)
     progress.note(fmt::format(
         "parts of the mesh overlap, so that the volume of its triangles ({:.6g}) is not that of the "
         "solid ({:.6g}); the level set encloses {:.6g}",
         meshVolume, solid, gridVolume));
-    return;
-  }
-  // The error of a shape that is thin for its voxels falls with the square of their size.
-  failThin(mesh, grid,
-           fmt::format("it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart, 1 % allowed)",
-                       gridVolume, solid, 100 * error),
-           voxelSize * std::min(0.5, std::sqrt(0.5 * kVolumeTolerance / error)));
 }
 
 void checkMesh(const Mesh& mesh) {
@@ -154,6 +161,9 @@ VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& o
   require(std::isfinite(h) && h > 0, fmt::format("level set: the voxel size must be > 0, got {}", h));
   require(std::isfinite(options.halfWidthVoxels) && options.halfWidthVoxels >= 1,
           fmt::format("level set: the half-width must be at least 1 voxel, got {}", options.halfWidthVoxels));
+  require(
+      options.mostVolumeError > 0,
+      fmt::format("level set: the largest error of the volume must be > 0, got {}", options.mostVolumeError));
   checkMesh(mesh);
   progress.begin("level set");
   const detail::BandOptions bandOptions{h, options.halfWidthVoxels, options.halfWidthVoxels};
@@ -161,7 +171,7 @@ VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& o
   require(surface.closed, "level set: the mesh is not closed, so that it has no inside; repair it first");
   std::optional<VoxelGrid<float>> band = detail::signedBand(surface, bandOptions, progress);
   if (!band) band = detail::floodedBand(mesh, bandOptions, progress);
-  checkVolume(mesh, *band, h, progress);
+  checkVolume(mesh, *band, options, progress);
   return *std::move(band);
 }
 

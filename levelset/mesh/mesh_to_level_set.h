@@ -11,13 +11,16 @@ struct MeshToLevelSetOptions {
   double voxelSize = 0.0;
   /// Band in voxels on either side of the surface, >= 1.
   double halfWidthVoxels = 3.0;
+  /// Share of the mesh's volume by which that of the level set, or of the surface that marching cubes would
+  /// make of it, may be off. From a hundredth on there is a note.
+  double mostVolumeError = 0.1;
 };
 
 /// Signed distance to a closed, outward-oriented triangle mesh in a narrow band, positive inside.
 /// Exact to float rounding where the sheets of the mesh do not overlap; else OpenVDB's union of them, with a
 /// note.
-/// @throws Error if the mesh is not closed, or if the grid's volume differs from the mesh's by 1 % or more
-/// (where that is defined), naming both and a voxel size to try; Cancelled.
+/// @throws Error if the mesh is not closed, or if the volume differs from the mesh's by more than is allowed,
+/// naming both and a voxel size to try; Cancelled.
 VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
                                 const Progress& progress = silent());
 

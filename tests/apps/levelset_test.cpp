@@ -114,6 +114,22 @@ TEST_F(LevelsetVerb, OverlappingPartsAreJoinedWithANote) {
   EXPECT_NEAR(jsonOf(stats_).at("grid").at("volume").get<double>(), 7.0686, 0.07);
 }
 
+TEST_F(LevelsetVerb, SaysWhatIsThinAndFailsWhereThatIsAskedFor) {
+  // A ball with a rod: a tenth of the volume, one and a half voxels thick at resolution 20.
+  const Mesh ball = icosphere(1.0, 4);
+  writeMesh(mesh_, joined(ball, boxMesh({1.1, -0.11, -0.11}, {3.1, 0.11, 0.11})));
+  const ProgramResult noted = run("--resolution 20");
+  EXPECT_EQ(noted.exitCode, 0) << noted.errors;
+  EXPECT_NE(noted.errors.find("the level set is not quite the mesh"), std::string::npos) << noted.errors;
+  EXPECT_NE(noted.errors.find("try resolution"), std::string::npos) << noted.errors;
+  const ProgramResult refused = run("--resolution 20 --max-volume-error 0.1%");
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_NE(refused.errors.find("0.1 % allowed"), std::string::npos) << refused.errors;
+  EXPECT_EQ(run("--max-volume-error 0").exitCode, 2);
+  // A mesh that voxels hold says nothing.
+  EXPECT_EQ(run("--resolution 200").errors, "");
+}
+
 TEST(LevelsetOpenBunny, IsRepairedOrRefused) {
   // 223 boundary edges, 5 holes. Unrepaired, OpenVDB loses its sign: 0.004 instead of its volume.
   const std::string mesh = sharedData("defective/bunny_open_5_holes_ascii.ply");

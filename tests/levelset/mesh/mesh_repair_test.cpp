@@ -287,6 +287,31 @@ TEST(MeshRepair, AShellThinnerThanVoxelsIsRefusedBeforeItIsMade) {
   EXPECT_EQ(repairMesh(nearlyClosed, {.mode = Mode::wrap, .voxelSize = 0.2}).repairs.size(), 1u);
 }
 
+TEST(MeshRepair, AWrapIsCoarserWhereAFinerOneWouldEnterHoles) {
+  // A sphere without its pole: a hole about 0.13 wide. Alpha is a voxel of 2 / 64 and enters it, alphas of
+  // twice and four times that find it closed, at the latter for certain.
+  Mesh open = test::icosphere(1, 4);
+  const double hole = 0.065;
+  Mesh kept;
+  kept.positions = open.positions;
+  for (std::size_t f = 0; f != open.faceCount(); ++f) {
+    const auto face = open.face(f);
+    const bool isPole = std::ranges::any_of(face, [&](std::uint32_t v) {
+      const Vec3d& p = open.positions[v];
+      return p.z > 0 && std::hypot(p.x, p.y) < hole;
+    });
+    if (!isPole) kept.addFace(face);
+  }
+  ASSERT_GT(diagnose(kept).boundaryEdges, 0u);
+  const RepairedMesh solid = repairMesh(kept, {.mode = Mode::wrap, .voxelSize = 2.0 / 64});
+  ASSERT_EQ(solid.repairs.size(), 1u) << solid.repairs[1];
+  EXPECT_NE(solid.repairs[0].find("a finer wrap would enter"), std::string::npos) << solid.repairs[0];
+  // Between the sphere and the one that is the coarsest offset larger.
+  const double ball = 4 * M_PI / 3, offset = 4 * 2.0 / 384;
+  EXPECT_GT(solid.after.volume, 0.99 * ball);
+  EXPECT_LT(solid.after.volume, ball * std::pow(1 + offset, 3));
+}
+
 TEST(MeshRepair, AWrapStopsWhereItIsCancelled) {
   struct Stop final : Progress {
     mutable std::atomic<int> asked{0};

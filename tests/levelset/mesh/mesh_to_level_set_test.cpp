@@ -156,6 +156,46 @@ TEST(MeshToLevelSet, WallsThatMarchingCubesWouldLoseAreRefused) {
     }
 }
 
+// The volumes of thin tori, as marching cubes give them, decide between silence, a note and an error.
+TEST(MeshToLevelSet, SaysByHowMuchItIsOffAndFailsWhereThatIsTooMuch) {
+  struct Notes final : Progress {
+    void note(std::string_view text) const override { notes.emplace_back(text); }
+    mutable std::vector<std::string> notes;
+  };
+  int silent = 0, noted = 0, refused = 0;
+  for (const double radius : {0.02, 0.04, 0.06, 0.08, 0.12, 0.25}) {
+    const Mesh mesh = torusMesh(1.0, radius, 256, 64);
+    const double volume = signedVolume(mesh);
+    const auto errorOf = [&](const VoxelGrid<float>& grid) {
+      return std::max(std::abs(enclosedVolume(grid) / volume - 1),
+                      std::abs(signedVolume(marchingCubes(*toBricks(grid))) / volume - 1));
+    };
+    const double error =
+        errorOf(meshToLevelSet(mesh, {.voxelSize = 0.04, .mostVolumeError = 100}, nephele::silent()));
+    const Notes progress;
+    try {
+      meshToLevelSet(mesh, {.voxelSize = 0.04}, progress);
+      EXPECT_LT(error, 0.1) << radius;
+      EXPECT_TRUE(error > 0.01 || progress.notes.empty()) << radius;
+      if (error > 0.02) {
+        ASSERT_EQ(progress.notes.size(), 1u) << radius;
+        EXPECT_NE(progress.notes[0].find("% apart"), std::string::npos) << progress.notes[0];
+        EXPECT_NE(progress.notes[0].find("try resolution"), std::string::npos) << progress.notes[0];
+      }
+      ++(progress.notes.empty() ? silent : noted);
+    } catch (const Error&) {
+      EXPECT_GE(error, 0.1) << radius;
+      ++refused;
+    }
+    // A limit just above and just below what it is.
+    EXPECT_NO_THROW(meshToLevelSet(mesh, {.voxelSize = 0.04, .mostVolumeError = 1.01 * error}));
+    EXPECT_THROW(meshToLevelSet(mesh, {.voxelSize = 0.04, .mostVolumeError = 0.99 * error}), Error);
+  }
+  EXPECT_GT(silent, 0);
+  EXPECT_GT(noted, 0);
+  EXPECT_GT(refused, 0);
+}
+
 TEST(MeshToLevelSet, TheSurfaceEnclosesWhatMarchingCubesGive) {
   const auto grid = meshToLevelSet(torusMesh(1.0, 0.4, 96, 48), {.voxelSize = 0.05});
   const double mesh = signedVolume(marchingCubes(*toBricks(grid)));
