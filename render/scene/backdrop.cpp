@@ -11,7 +11,7 @@ namespace nephele {
 namespace {
 
 Vec3f radiance(const Vec3f& towards, const Lights& lights) {
-  if (lights.map) return lights.map->radiance(towards);
+  if (lights.map) return lights.map->smoothRadiance(towards);
   const Vec3f sky = lights.sky;
   const float most = std::max({sky.x, sky.y, sky.z});
   const Vec3f haze = sky * 0.6f + Vec3f{0.7f, 0.7f, 0.7f} * most;

@@ -5,7 +5,7 @@
 // is constant there, the density is luminance over its integral, exactly.
 //
 // Source: inversion of tabulated distributions, any textbook of rendering (Pharr, Jakob, Humphreys).
-// Limits: pixels show as such where the sky is looked at directly.
+// Limits: paths that leave see pixels as such.
 #include "nephele/render/scene/environment.h"
 
 #include <fmt/format.h>
@@ -32,6 +32,13 @@ double luminance(const Vec3f& c) {
 std::size_t drawn(const double* cumulative, std::size_t count, double value) {
   const double* at = std::upper_bound(cumulative, cumulative + count, value);
   return std::min(std::size_t(at - cumulative), count - 1);
+}
+
+// The cubic B-spline: 0 from 2 on, of integral 1.
+double bSpline(double x) {
+  x = std::fabs(x);
+  if (x >= 2) return 0;
+  return x < 1 ? 2.0 / 3 - x * x + 0.5 * x * x * x : (2 - x) * (2 - x) * (2 - x) / 6;
 }
 
 }  // namespace
@@ -128,6 +135,37 @@ std::size_t Environment::pixelAt(const Vec3f& towards) const {
 
 Vec3f Environment::radiance(const Vec3f& towards) const {
   return data_->radiance[pixelAt(towards)];
+}
+
+Vec3f Environment::smoothRadiance(const Vec3f& towards) const {
+  const Vec3d d = normalize(Vec3d(towards));
+  const int width = data_->width, height = data_->height;
+  const double turns = (std::atan2(d.x, d.z) - rotation_ * double(kPi) / 180) / (2 * double(kPi));
+  const double column = (0.5 - turns) * width - 0.5,
+               row = std::acos(std::clamp(d.y, -1.0, 1.0)) / double(kPi) * height - 0.5;
+  Vec3d sum;
+  double weights = 0;
+  for (int y = int(std::ceil(row - 2)); y <= int(std::floor(row + 2)); ++y) {
+    // Beyond a pole rows go on at the other side.
+    const bool isBeyond = y < 0 || y >= height;
+    const int there = std::clamp(y < 0 ? -1 - y : y >= height ? 2 * height - 1 - y : y, 0, height - 1);
+    const double middle = column + (isBeyond ? width / 2.0 : 0.0);
+    const double wide = std::min(1 / std::sin((there + 0.5) * double(kPi) / height), width / 4.0);
+    Vec3d rowSum;
+    double rowWeights = 0;
+    for (int x = int(std::ceil(middle - 2 * wide)); x <= int(std::floor(middle + 2 * wide)); ++x) {
+      const double weight = bSpline((x - middle) / wide);
+      const int column0 = (x % width + width) % width;
+      rowSum +=
+          Vec3d(data_->radiance[std::size_t(there) * std::size_t(width) + std::size_t(column0)]) * weight;
+      rowWeights += weight;
+    }
+    const double weight = bSpline(y - row);
+    if (!(rowWeights > 0)) continue;
+    sum += rowSum * (weight / rowWeights);
+    weights += weight;
+  }
+  return weights > 0 ? Vec3f(sum * (1 / weights)) : radiance(towards);
 }
 
 Vec3f Environment::mean() const {

@@ -45,6 +45,10 @@ class Environment {
 
   /// Radiance from a direction, of any length but zero.
   Vec3f radiance(const Vec3f& towards) const;
+  /// The same as a picture of the sky is looked at: smoothed by a cubic B-spline over pixels. Towards the
+  /// poles, where they get narrow, it spans as many of a row as are as wide together as they are high, so
+  /// that it has no seam there.
+  Vec3f smoothRadiance(const Vec3f& towards) const;
   /// Mean over all directions.
   Vec3f mean() const;
   /// Mean over the directions nearest to each of `towards`, all scaled so that their mean is the map's.

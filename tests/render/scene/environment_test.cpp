@@ -54,6 +54,38 @@ std::shared_ptr<BrickGrid> smallCloud() {
   });
 }
 
+// Neighbouring pixels of this map differ by up to 1, by the pole as well as across the seam; half a degree is
+// a ninetieth of a pixel of 45 degrees, and a B-spline's slope is at most 2/3 per pixel and axis.
+TEST(Environment, LookedAtSmoothlyHasNoEdges) {
+  constexpr int kWidth = 8, kHeight = 4;
+  std::vector<Vec3f> values;
+  std::uint32_t state = 1;
+  for (int i = 0; i != kWidth * kHeight; ++i) {
+    state = state * 1664525u + 1013904223u;
+    values.push_back(Vec3f{1, 1, 1} * (float(state >> 8) / float(1 << 24)));
+  }
+  const Environment sky(kWidth, kHeight, values, {.rotationDegrees = 30});
+  const auto at = [&](double azimuth, double polar) {
+    const double a = azimuth * M_PI / 180, p = polar * M_PI / 180;
+    return double(sky.smoothRadiance(Vec3f{float(std::sin(a) * std::sin(p)), float(std::cos(p)),
+                                           float(std::cos(a) * std::sin(p))})
+                      .x);
+  };
+  double mostSmooth = 0;
+  for (double azimuth = 0; azimuth < 360; azimuth += 7.3) {
+    // Through the upper pole to the other side, and round once.
+    for (double polar = 0.25; polar < 60; polar += 0.5)
+      mostSmooth = std::max(mostSmooth, std::fabs(at(azimuth, polar) - at(azimuth, polar + 0.5)));
+    mostSmooth = std::max(mostSmooth, std::fabs(at(azimuth, 0.25) - at(azimuth + 180, 0.25)));
+    for (const double polar : {5.0, 45.0, 90.0, 140.0})
+      mostSmooth = std::max(mostSmooth, std::fabs(at(azimuth, polar) - at(azimuth + 0.5, polar)));
+  }
+  EXPECT_LT(mostSmooth, 0.03);
+  const Environment even(kWidth, kHeight, std::vector<Vec3f>(kWidth * kHeight, {0.3f, 0.4f, 0.5f}));
+  for (const float y : {-1.0f, -0.2f, 0.9f, 1.0f})
+    EXPECT_NEAR(even.smoothRadiance({0.1f, y, 0.2f}).y, 0.4f, 1e-6f);
+}
+
 TEST(Environment, LooksUpWhereOpenExrPutsDirections) {
   // Rows from +y down; the middle column is +z, the right quarter -x, the left one +x.
   std::vector<Vec3f> radiance(8 * 4);
