@@ -35,6 +35,11 @@ void addPictures(CLI::App& app, TransferArguments& a) {
   addCount(app, "--checker", a.picture.checkers, 1, 10000,
            "Fields of the chess board across the texture coordinates, where there is no texture.")
       ->needs(preview);
+  addChoice(
+      app, "--preview-paint", a.paintsDistortion, {{"texture", false}, {"distortion", true}},
+      "What the preview shows: the texture, or where it is stretched (yellow, red from 4 times on), turned "
+      "over, collapsed or not shown at all (violet).")
+      ->needs(preview);
 }
 
 /// Whether the format of `path` can hold `attribute`, once it is carried.

@@ -28,6 +28,8 @@ struct TransferArguments {
   /// That of the reference's picture, unless given.
   bool bakeSizeGiven = false;
   TransferPictureOptions picture;
+  /// What the preview shows: the attributes, or how well the map keeps shapes.
+  bool paintsDistortion = false;
 
   /// The attributes to carry: those asked for, or all that the output can hold. Says what is left out.
   /// @throws Error naming a file that lacks what is asked for or cannot hold it.

@@ -96,7 +96,10 @@ void transfer(const TransferArguments& arguments, Run& run) {
     writePng(arguments.bakedTexture, *baked, {.shoulder = 0.99999f}, run.metadata());
   }
   if (!arguments.preview.empty())
-    writePng(arguments.preview, pictureTransfer(reference, result, texture, baked, arguments.picture, run),
+    writePng(arguments.preview,
+             arguments.paintsDistortion
+                 ? pictureDistortion(reference, object, quality, arguments.picture, run)
+                 : pictureTransfer(reference, result, texture, baked, arguments.picture, run),
              {}, run.metadata());
   run.begin("write");
   writeMesh(arguments.output, result);

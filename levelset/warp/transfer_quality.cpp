@@ -18,9 +18,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <vector>
 
+#include "nephele/levelset/grid/disjoint_sets.h"
 #include "nephele/levelset/warp/reference_surface.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -34,6 +36,8 @@ constexpr std::size_t kSamples = 16384;
 
 struct Triangle {
   std::array<Vec3d, 3> object, image;
+  /// Among all triangles of the object.
+  std::uint32_t number = 0;
 };
 
 /// Those of the object that have area, with the images of their corners relative to `origin`.
@@ -43,9 +47,11 @@ std::vector<Triangle> mappedTriangles(const Mesh& object, std::span<const Vec3d>
   constexpr double kNoArea = 1e-12;
   std::vector<Triangle> triangles;
   triangles.reserve(object.corners.size() / 3);
+  std::uint32_t number = 0;
   for (std::size_t f = 0; f < object.faceCount(); ++f)
-    for (std::uint32_t c = object.faceStart[f] + 2; c < object.faceStart[f + 1]; ++c) {
+    for (std::uint32_t c = object.faceStart[f] + 2; c < object.faceStart[f + 1]; ++c, ++number) {
       Triangle t;
+      t.number = number;
       const std::uint32_t corners[] = {object.faceStart[f], c - 1, c};
       for (std::size_t i = 0; i < 3; ++i) {
         const std::uint32_t v = object.corners[corners[i]];
@@ -127,8 +133,11 @@ std::vector<Sample> evenSamples(const detail::ReferenceSurface& reference) {
   return samples;
 }
 
-double coverageOf(const detail::ReferenceSurface& reference, const std::vector<Triangle>& triangles,
-                  const Facts& facts, const Progress& progress) {
+/// Which of the samples images lie on.
+std::vector<std::uint8_t> coveredOf(const detail::ReferenceSurface& reference,
+                                    const std::vector<Sample>& samples,
+                                    const std::vector<Triangle>& triangles, const Facts& facts,
+                                    const Progress& progress) {
   Mesh images;
   std::vector<std::uint32_t> which;
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
@@ -138,12 +147,11 @@ double coverageOf(const detail::ReferenceSurface& reference, const std::vector<T
     images.addFace(std::array<std::uint32_t, 3>{first, first + 1, first + 2});
     which.push_back(t);
   }
-  const std::vector<Sample> samples = evenSamples(reference);
-  if (which.empty() || samples.empty()) return 0;
+  std::vector<std::uint8_t> isCovered(samples.size());
+  if (which.empty() || samples.empty()) return isCovered;
 
   const NearestOnMesh nearest(images);
   const float touching = 1e-4f * boundingBox(reference.triangles()).longestSide();
-  std::vector<std::uint8_t> isCovered(samples.size());
   parallelFor(
       samples.size(), 256,
       [&](std::size_t begin, std::size_t end) {
@@ -163,7 +171,67 @@ double coverageOf(const detail::ReferenceSurface& reference, const std::vector<T
         }
       },
       progress);
-  return double(std::count(isCovered.begin(), isCovered.end(), 1)) / double(samples.size());
+  return isCovered;
+}
+
+std::vector<Sample> middleSamples(std::size_t triangles) {
+  std::vector<Sample> samples(triangles);
+  for (std::uint32_t t = 0; t < triangles; ++t) samples[t] = {t, {1.0 / 3, 1.0 / 3, 1.0 / 3}};
+  return samples;
+}
+
+/// Of the triangles that `isIn` says, which hang together by their corners. `whole`: the area of all.
+SurfaceRegion largestRegion(const Mesh& triangles, const std::function<bool(std::size_t)>& isIn, double whole,
+                            const Vec3d& origin) {
+  const std::vector<std::uint32_t> first = firstEqualPosition(triangles.positions);
+  detail::DisjointSets sets(triangles.positions.size());
+  const auto vertex = [&](std::size_t t, std::size_t corner) {
+    return first[triangles.corners[3 * t + corner]];
+  };
+  for (std::size_t t = 0; t < triangles.faceCount(); ++t) {
+    if (!isIn(t)) continue;
+    sets.join(vertex(t, 0), vertex(t, 1));
+    sets.join(vertex(t, 0), vertex(t, 2));
+  }
+  std::vector<double> areas(triangles.positions.size());
+  std::vector<Vec3d> moments(triangles.positions.size());
+  for (std::size_t t = 0; t < triangles.faceCount(); ++t) {
+    if (!isIn(t)) continue;
+    const Vec3d &a = triangles.positions[vertex(t, 0)], &b = triangles.positions[vertex(t, 1)],
+                &c = triangles.positions[vertex(t, 2)];
+    const double area = 0.5 * length(cross(b - a, c - a));
+    const std::uint32_t root = sets.root(vertex(t, 0));
+    areas[root] += area;
+    moments[root] += (a + b + c) * (area / 3);
+  }
+  const auto most = std::max_element(areas.begin(), areas.end());
+  if (most == areas.end() || !(*most > 0) || !(whole > 0)) return {};
+  return {moments[std::size_t(most - areas.begin())] / *most + origin, *most / whole};
+}
+
+/// What is bad, triangle by triangle, and where most of it is.
+void findRegions(const detail::ReferenceSurface& reference, const Mesh& object,
+                 const std::vector<Triangle>& triangles, const Facts& facts, const Progress& progress,
+                 TransferQuality& quality) {
+  const Mesh fans = triangulated(object);
+  quality.stretch.assign(fans.faceCount(), 1.0f);
+  double bad = 0;
+  const double whole = surfaceArea(fans);
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const bool isWrong = facts.isCollapsed[i] || facts.isFlipped[i];
+    const float stretch = isWrong ? std::numeric_limits<float>::infinity() : facts.stretch[i];
+    quality.stretch[triangles[i].number] = stretch;
+    const auto& t = triangles[i].object;
+    if (stretch >= TransferQuality::kBadStretch) bad += 0.5 * length(cross(t[1] - t[0], t[2] - t[0]));
+  }
+  quality.badFraction = whole > 0 ? bad / whole : 0;
+  quality.worst = largestRegion(
+      fans, [&](std::size_t t) { return quality.stretch[t] >= TransferQuality::kBadStretch; }, whole, {});
+  const Mesh& target = reference.triangles();
+  quality.isCovered = coveredOf(reference, middleSamples(target.faceCount()), triangles, facts, progress);
+  quality.uncovered = largestRegion(
+      target, [&](std::size_t t) { return quality.isCovered[t] == 0; }, surfaceArea(target),
+      reference.origin());
 }
 
 }  // namespace
@@ -217,7 +285,11 @@ TransferQuality transferQuality(const Mesh& reference, const Mesh& object, std::
   quality.flippedFraction = double(std::count(facts.isFlipped.begin(), facts.isFlipped.end(), 1)) / count;
   quality.stretchMedian = percentile(facts.stretch, 0.5);
   quality.stretchP95 = percentile(facts.stretch, 0.95);
-  quality.coverage = coverageOf(surface, triangles, facts, progress);
+  const std::vector<Sample> samples = evenSamples(surface);
+  const auto isCovered = coveredOf(surface, samples, triangles, facts, progress);
+  if (!samples.empty())
+    quality.coverage = double(std::count(isCovered.begin(), isCovered.end(), 1)) / double(samples.size());
+  findRegions(surface, object, triangles, facts, progress, quality);
   return quality;
 }
 

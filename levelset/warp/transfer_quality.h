@@ -1,11 +1,21 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 
 namespace nephele {
+
+/// The largest of the connected regions of a surface that something is wrong with.
+struct SurfaceRegion {
+  /// Of its area.
+  Vec3d middle{};
+  /// Of the area of the surface; 0 where there is no such region.
+  double share = 0.0;
+};
 
 /// How well a map from the surface of an object to that of a reference keeps shapes: the same measures
 /// whatever made the map.
@@ -31,6 +41,19 @@ struct TransferQuality {
   /// where the reference faces the same half space, and is met within 45 degrees of the normal, or closer
   /// than 1e-4 of the reference's longest side. Image triangles that have collapsed cover nothing.
   double coverage = 0.0;
+
+  /// From this stretch on a triangle is bad; so are those that have collapsed or are turned over.
+  static constexpr float kBadStretch = 4.0f;
+  /// Share of the object's area in bad triangles, and the largest connected region of them.
+  double badFraction = 0.0;
+  SurfaceRegion worst{};
+  /// The largest connected region of the reference whose triangles have middles that no image lies on.
+  SurfaceRegion uncovered{};
+  /// For each triangle of `triangulated(object)`: its stretch, infinite where it has collapsed or is turned
+  /// over, 1 where it has no area.
+  std::vector<float> stretch{};
+  /// For each triangle of `triangulated(reference)`: whether an image lies on its middle.
+  std::vector<std::uint8_t> isCovered{};
 };
 
 /// Measures the map that takes every position of `object` (images.size() == object.positions.size()) or every

@@ -3,7 +3,9 @@
 #include "nephele/render/preview/transfer_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/preview/surface_picture.h"
@@ -44,12 +46,57 @@ SurfaceObject placed(const Mesh& mesh, const TransferPictureOptions& options, do
   return object;
 }
 
+constexpr double kGap = 0.18;
+
+Image picture(std::vector<SurfaceObject> objects, const TransferPictureOptions& options,
+              const Progress& progress) {
+  return pictureSurfaces(std::move(objects),
+                         {.width = options.width,
+                          .height = options.height,
+                          .elevationDegrees = options.elevationDegrees,
+                          .samples = options.samples},
+                         progress);
+}
+
+/// Colours from kept over stretched to wrong, side by side.
+Image paintBox() {
+  constexpr Vec3f kGrey{0.5f, 0.54f, 0.56f}, kYellow{0.85f, 0.6f, 0.1f}, kRed{0.7f, 0.05f, 0.03f},
+      kViolet{0.16f, 0.01f, 0.3f};
+  Image image;
+  image.width = 256;
+  image.height = 1;
+  std::array<std::vector<float>*, 3> channels{};
+  for (const char* name : {"R", "G", "B"}) image.add(name, false);
+  for (std::size_t c = 0; c != 3; ++c) channels[c] = &image.channels[c].values;
+  for (int x = 0; x != image.width; ++x) {
+    const float u = (float(x) + 0.5f) / float(image.width);
+    const auto mix = [](const Vec3f& a, const Vec3f& b, float share) {
+      return a + (b - a) * std::clamp(share, 0.0f, 1.0f);
+    };
+    const Vec3f colour = u > 0.85f   ? kViolet
+                         : u > 0.35f ? mix(kYellow, kRed, (u - 0.35f) / 0.3f)
+                                     : mix(kGrey, kYellow, (u - 0.05f) / 0.3f);
+    for (int c = 0; c != 3; ++c) (*channels[std::size_t(c)])[std::size_t(x)] = colour[c];
+  }
+  return image;
+}
+
+/// Triangles with a place in the box of colours each.
+Mesh painted(const Mesh& mesh, std::size_t count, const std::function<float(std::size_t)>& placeOf) {
+  Mesh result = triangulated(requireValid(mesh));
+  require(result.faceCount() == count, "picture of a transfer: the quality is that of other meshes");
+  result.attributes = {{"uv", MeshAttribute::Domain::corner, 2, {}}};
+  for (std::size_t t = 0; t != count; ++t)
+    for (int corner = 0; corner != 3; ++corner)
+      for (const float value : {placeOf(t), 0.5f}) result.attributes[0].values.push_back(value);
+  return result;
+}
+
 }  // namespace
 
 Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr<const Image> texture,
                       std::shared_ptr<const Image> objectTexture, const TransferPictureOptions& options,
                       const Progress& progress) {
-  constexpr double kGap = 0.18;
   constexpr Vec3f kCanvas{0.92f, 0.92f, 0.92f}, kBoard{0.82f, 0.52f, 0.24f};
   double left = 0;
   std::vector<SurfaceObject> objects;
@@ -62,12 +109,34 @@ Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr
     o.colour = o.texture ? kCanvas : kBoard;
     o.checkers = o.texture ? 0 : options.checkers;
   }
-  return pictureSurfaces(std::move(objects),
-                         {.width = options.width,
-                          .height = options.height,
-                          .elevationDegrees = options.elevationDegrees,
-                          .samples = options.samples},
-                         progress);
+  return picture(std::move(objects), options, progress);
+}
+
+Image pictureDistortion(const Mesh& reference, const Mesh& object, const TransferQuality& quality,
+                        const TransferPictureOptions& options, const Progress& progress) {
+  const auto paint = std::make_shared<const Image>(paintBox());
+  // Where a triangle's colour stands in the box.
+  constexpr float kKept = 0.02f, kBad = 0.7f, kWrong = 0.95f;
+  double left = 0;
+  std::vector<SurfaceObject> objects;
+  objects.push_back(placed(painted(reference, quality.isCovered.size(),
+                                   [&](std::size_t t) { return quality.isCovered[t] ? kKept : kWrong; }),
+                           options, left));
+  left += kGap;
+  objects.push_back(placed(painted(object, quality.stretch.size(),
+                                   [&](std::size_t t) {
+                                     const float stretch = quality.stretch[t];
+                                     if (std::isinf(stretch)) return kWrong;
+                                     const float share = std::log(std::max(stretch, 1.0f)) /
+                                                         std::log(TransferQuality::kBadStretch);
+                                     return kKept + (kBad - kKept) * std::min(share, 1.0f);
+                                   }),
+                           options, left));
+  for (SurfaceObject& o : objects) {
+    o.texture = paint;
+    o.colour = {1, 1, 1};
+  }
+  return picture(std::move(objects), options, progress);
 }
 
 }  // namespace nephele

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "nephele/levelset/warp/transfer_quality.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
@@ -25,5 +26,12 @@ struct TransferPictureOptions {
 Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr<const Image> texture,
                       std::shared_ptr<const Image> objectTexture, const TransferPictureOptions& options = {},
                       const Progress& progress = silent());
+
+/// The same two shapes painted by how well a map from the object to the reference keeps them: the object from
+/// grey (kept) over yellow to red (stretched by TransferQuality::kBadStretch), violet where its triangles
+/// have collapsed or are turned over; the reference grey, violet where no image lies.
+/// @throws Error as pictureTransfer, or if `quality` is not that of these meshes; Cancelled.
+Image pictureDistortion(const Mesh& reference, const Mesh& object, const TransferQuality& quality,
+                        const TransferPictureOptions& options = {}, const Progress& progress = silent());
 
 }  // namespace nephele

@@ -86,6 +86,23 @@ TEST_F(TransferVerb, GivesAnObjectTextureCoordinatesAndSaysHowGood) {
   EXPECT_GE(double(json["stretch_p95"]), double(json["stretch_median"]));
 }
 
+TEST_F(TransferVerb, SaysWhereAMapIsTornAndPaintsIt) {
+  // Onto a sphere of which it shows one side only: far away, all of the tori is nearest to that side.
+  writeMesh(file("far.obj"), turned(readMesh(tori_), 0, 1, {20, 0, 0}));
+  const ProgramResult torn = transfer(sphere_, file("far.obj"),
+                                      withStats("out.obj") + "--align none --method closest --preview " +
+                                          file("p.png") + " --preview-paint distortion --size 64x32");
+  ASSERT_EQ(torn.exitCode, 0) << torn.errors;
+  EXPECT_NE(torn.errors.find("of the reference is not shown"), std::string::npos) << torn.errors;
+  EXPECT_NE(torn.errors.find("the largest region of it lies near ("), std::string::npos) << torn.errors;
+  EXPECT_GT(double(stats()["largest_uncovered_region"]["share"]), 0.5);
+  EXPECT_EQ(readImage(file("p.png")).width, 64);
+  const ProgramResult whole = transfer(sphere_, sphere_, withStats("out.obj") + "--align none");
+  ASSERT_EQ(whole.exitCode, 0) << whole.errors;
+  EXPECT_EQ(whole.errors.find("not shown"), std::string::npos) << whole.errors;
+  EXPECT_LT(double(stats()["worst_region"]["share"]), 0.005);
+}
+
 TEST_F(TransferVerb, SmearsNoFaceOverTheSeam) {
   for (const char* options : {"--align none --quality fast", "--quality fast", "--method closest"}) {
     ASSERT_EQ(transfer(sphere_, tori_, withStats("out.ply") + options).exitCode, 0);

@@ -105,6 +105,29 @@ TEST(TransferQuality, CountsWhatCollapsesAndWhatFolds) {
   EXPECT_GE(q.stretchP95, 1e5);
 }
 
+TEST(TransferQuality, SaysWhereMostOfItIsBad) {
+  // As above: of x > 3/4 and x < 1/4 the two regions are equal strips; with 3/16 the first is the larger one,
+  // and its middle is (7/8, 1/2). What is not covered is x < 3/16 and, by folding back, x > 3/4.
+  const Mesh plane = square(32);
+  const auto map = [](const Vec3d& p) {
+    const double x = p.x > 0.75 ? 1.5 - p.x : std::max(p.x, 0.1875);
+    return Vec3d{x, p.y, 0};
+  };
+  const TransferQuality q = transferQuality(plane, plane, mapped(plane, map));
+  EXPECT_NEAR(q.badFraction, 0.25 + 0.1875, 1e-6);
+  EXPECT_NEAR(q.worst.share, 0.25, 1e-6);
+  EXPECT_NEAR(length(q.worst.middle - Vec3d{0.875, 0.5, 0}), 0, 1e-6);
+  EXPECT_NEAR(q.uncovered.share, 0.25, 1.5 / 32);
+  EXPECT_NEAR(length(q.uncovered.middle - Vec3d{0.875, 0.5, 0}), 0, 1.5 / 32);
+  ASSERT_EQ(q.stretch.size(), 2048u);
+  ASSERT_EQ(q.isCovered.size(), 2048u);
+  EXPECT_EQ(std::ranges::count_if(q.stretch, [](float s) { return std::isinf(s); }), 2048 * 7 / 16);
+  const TransferQuality same = transferQuality(plane, plane, plane.positions);
+  EXPECT_EQ(same.worst.share, 0);
+  EXPECT_EQ(same.uncovered.share, 0);
+  EXPECT_EQ(same.badFraction, 0);
+}
+
 TEST(TransferQuality, CoverageKeepsTheTwoSidesOfASheetApart) {
   // A thin slab; only its upper half is mapped to.
   const Mesh slab = boxMesh({0, 0, 0}, {1, 1, 0.01}), plane = square(8);
