@@ -55,6 +55,17 @@ if picture silver_lining; then
   keep silver_lining.png
 fi
 
+if picture clear_sky; then
+  grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
+  files=
+  for sun in "60 0" "38 0" "15 0.5" "5 2" "1 3.5" "-4 7"; do
+    elevation=${sun% *}
+    show "clear_sky_$elevation" bunny.vdb --backdrop --size 480x270 --view 25,3 --sun "130,$elevation" --sky clear --exposure "${sun#* }"
+    files="$files clear_sky_$elevation.png"
+  done
+  padding="" tiles clear_sky.jpg 3x2 $files
+fi
+
 if picture bunny; then
   grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
   show bunny bunny.vdb --size 960x720

@@ -10,6 +10,7 @@
 #include "apps/options/colour_options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/light/deep_shadow.h"
+#include "nephele/render/scene/clear_sky.h"
 
 namespace nephele::apps {
 namespace {
@@ -73,18 +74,25 @@ DistantLight sunOf(const std::string& name, const Numbers& numbers, const Vec3f&
 // Irradiance that makes a cloud nearly white in a preview without exposure.
 constexpr float kSunIntensity = 3.6f;
 
+DistantLight defaultSun() {
+  return sunOf("sun", {90, 38}, Vec3f{1, 1, 1} * kSunIntensity);
+}
+
 void addSuns(CLI::App& app, LightOptions& options) {
   const std::string form = "none, or [NAME=]AZIMUTH,ELEVATION[,INTENSITY or ,R,G,B], intensities at least 0";
   addRepeated(app, "--sun", "[NAME=]AZ,EL[,INTENSITY|,R,G,B]", form,
-              "Where sunlight comes from, in degrees as for --view, and its irradiance; may be given again. "
-              "none: no sun.",
+              "Where sunlight comes from, in degrees as for --view, and its irradiance (else 3.6, or that of "
+              "--sky clear); may be given again. none: no sun.",
               [&options, form](const std::string& name, const std::string& text) {
                 if (text == "none") return options.noSun = true;
                 Numbers numbers = parseNumbers("--sun", text, form);
-                if (numbers.size() == 2) numbers.push_back(double(kSunIntensity));
+                auto& suns = options.lights.suns;
+                if (numbers.size() == 2) {
+                  options.sunsOfTheSky.push_back(suns.size());
+                  numbers.push_back(double(kSunIntensity));
+                }
                 const auto colour = colourFrom(numbers, 2);
                 if (!colour) return false;
-                auto& suns = options.lights.suns;
                 suns.push_back(sunOf(nextName(name, "sun", suns.size()), numbers, *colour));
                 return true;
               })
@@ -210,24 +218,55 @@ bool isFile(const std::string& text) {
   return end == ".exr" || end == ".hdr" || end == ".png";
 }
 
+// "clear" or "clear:TURBIDITY".
+std::optional<float> turbidityFrom(const std::string& text, const std::string& form) {
+  const std::string kind = text.substr(0, text.find(':'));
+  if (kind != "clear") return std::nullopt;
+  if (kind.size() == text.size()) return ClearSky::Options{}.turbidity;
+  const Numbers numbers = parseNumbers("--sky", text.substr(kind.size() + 1), form);
+  if (numbers.size() != 1 || !(numbers[0] >= 1 && numbers[0] <= 10)) refuseValue("--sky", text, form);
+  return float(numbers[0]);
+}
+
 void addSky(CLI::App& app, LightOptions& options) {
   const Vec3f& sky = options.lights.sky;
   app.add_option_function<std::string>(
          "--sky",
          [&options](const std::string& text) {
+           options.turbidity.reset();
            if (isFile(text)) {
              options.skyFile = text;
              return;
            }
-           const std::string form = "R,G,B, each at least 0, or a map (.exr, .hdr, .png)";
+           const std::string form =
+               "R,G,B, each at least 0, a map (.exr, .hdr, .png), or clear[:TURBIDITY], 1 to 10";
+           if ((options.turbidity = turbidityFrom(text, form))) {
+             options.skyFile.clear();
+             return;
+           }
            const auto colour = colourFrom(parseNumbers("--sky", text, form), 0);
            if (!colour || std::ranges::count(text, ',') != 2) refuseValue("--sky", text, form);
            options.skyFile.clear();
            options.lights.sky = *colour;
          },
-         "Radiance of the sky, the same in all directions, or a map of all directions.")
-      ->type_name("R,G,B|FILE")
+         "Radiance of the sky, the same in all directions, or a map of all directions. clear: the sky that "
+         "belongs to the first sun, from noon to dusk, and suns without an irradiance get theirs; TURBIDITY "
+         "is its haze, 1 (none) to 10, 2.5 if not given.")
+      ->type_name("R,G,B|FILE|clear[:TURBIDITY]")
       ->default_str(fmt::format("{:g},{:g},{:g}", sky.x, sky.y, sky.z));
+  app.add_option_function<std::string>(
+         "--ground-albedo",
+         [&options](const std::string& text) {
+           const std::string form = "A, or R,G,B, each within [0, 1]";
+           const Numbers numbers = parseNumbers("--ground-albedo", text, form);
+           const auto colour = colourFrom(numbers, 0);
+           if (!colour || std::ranges::any_of(numbers, [](double x) { return x > 1; }))
+             refuseValue("--ground-albedo", text, form);
+           options.groundAlbedo = *colour;
+         },
+         "What the ground under --sky clear reflects; it lights clouds from below.")
+      ->type_name("A|R,G,B")
+      ->default_str(fmt::format("{:g}", options.groundAlbedo.x));
   app.add_option_function<double>(
          "--sky-rotation",
          [&options](double x) { options.sky.rotationDegrees = finite("--sky-rotation", x); },
@@ -237,7 +276,7 @@ void addSky(CLI::App& app, LightOptions& options) {
       ->default_str("0");
   app.add_option_function<double>(
          "--sky-intensity", [&options](double x) { options.sky.intensity = finite("--sky-intensity", x); },
-         "Multiplies the radiance of the map.")
+         "Multiplies the radiance of the map, or of the clear sky.")
       ->type_name("NUMBER")
       ->check(CLI::Range(0.0, 1e6))
       ->default_str("1");
@@ -289,10 +328,18 @@ bool LightOptions::readsCodes() const {
 }
 
 Lights LightOptions::resolved(double mostBytes) const {
+  // Of a clear sky: enough for a backdrop that is interpolated.
+  constexpr int kRows = 96;
   Lights result = lights;
-  if (noSun) result.suns.clear();
-  if (!noSun && result.suns.empty() && result.locals.empty() && skyFile.empty())
-    result.suns.push_back(sunOf("sun", {90, 38}, Vec3f{1, 1, 1} * kSunIntensity));
+  std::vector<std::size_t> ofTheSky = sunsOfTheSky;
+  if (noSun) {
+    result.suns.clear();
+    ofTheSky.clear();
+  }
+  if (!noSun && result.suns.empty() && result.locals.empty() && skyFile.empty()) {
+    result.suns.push_back(defaultSun());
+    ofTheSky.push_back(0);
+  }
   for (const auto& [name, said] : decays) {
     bool known = false;
     for (LocalLight& light : result.locals)
@@ -309,6 +356,19 @@ Lights LightOptions::resolved(double mostBytes) const {
   for (const auto& [name, file] : readShadows) {
     const auto map = std::make_shared<const DeepShadowMap>(DeepShadowMap::read(file));
     forLights("--read-deep-shadow", name, result, [&](auto& light) { light.deepShadow = map; });
+  }
+  if (turbidity) {
+    ClearSky::Options clear;
+    clear.turbidity = *turbidity;
+    clear.groundAlbedo = groundAlbedo;
+    for (const std::size_t sun : ofTheSky) {
+      clear.sun = result.suns[sun].direction;
+      result.suns[sun].irradiance = ClearSky(clear).sunlight();
+    }
+    clear.sun = result.suns.empty() ? defaultSun().direction : result.suns.front().direction;
+    result.map = std::make_shared<const Environment>(
+        ClearSky(clear).map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
+    result.sky = {};
   }
   if (!skyFile.empty()) {
     result.map = std::make_shared<const Environment>(Environment::read(skyFile, sky, mostBytes));

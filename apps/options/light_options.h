@@ -31,8 +31,12 @@ struct LightOptions {
   float deepTolerance = 2e-3f;
   /// Files to take a light's shadow from, and to write it to.
   Said<std::string> readShadows, writtenShadows;
-  /// A sky from a file.
+  /// A sky from a file, or a clear one of some haze over some ground.
   std::string skyFile;
+  std::optional<float> turbidity;
+  Vec3f groundAlbedo{0.2f, 0.2f, 0.2f};
+  /// Numbers of suns whose irradiance is that of the clear sky, if there is one.
+  std::vector<std::size_t> sunsOfTheSky;
   Environment::Options sky;
 
   /// The lights of the picture; one sun where no light is given but a sky of one colour. Reads the sky's map.

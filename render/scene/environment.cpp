@@ -94,6 +94,7 @@ Environment::Environment(int width, int height, std::vector<Vec3f> radiance, con
       value[c] = std::max(value[c], 0.0f) * options.intensity;
     }
   data_ = std::make_shared<const Data>(width, height, std::move(radiance));
+  hasSpots_ = options.hasSpots;
   rotation_ = std::remainder(double(options.rotationDegrees), 360.0);
 }
 
@@ -234,6 +235,7 @@ float Environment::density(const Vec3f& towards) const {
 
 std::vector<DistantLight> Environment::takeSpots(int most) {
   std::vector<DistantLight> spots;
+  if (!hasSpots_) return spots;
   const auto width = std::size_t(data_->width);
   std::vector<Vec3f> radiance = data_->radiance;
   const double mean = data_->bright * (0.25 / double(kPi));

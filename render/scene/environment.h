@@ -22,6 +22,8 @@ class Environment {
     float rotationDegrees = 0;
     /// Multiplies the radiance, 0 to 1e6.
     float intensity = 1;
+    /// Whether `takeSpots` looks for any.
+    bool hasSpots = true;
     /// Of a file's numbers.
     ColourEncoding encoding = ColourEncoding::automatic;
   };
@@ -77,6 +79,7 @@ class Environment {
   std::size_t pixelAt(const Vec3f& towards) const;
 
   std::shared_ptr<const Data> data_;
+  bool hasSpots_ = true;
   /// In (-180, 180].
   double rotation_ = 0;
 };

@@ -79,6 +79,23 @@ TEST_F(LightOptions, SkyMapsAreSkies) {
   EXPECT_NEAR(map.at("G", 8, 6), constant.at("G", 8, 6), 4e-3f * constant.at("G", 8, 6));
 }
 
+TEST_F(LightOptions, ClearSkiesBelongToTheirSun) {
+  // Of ClearSky: the sun at 38 degrees is that without a sky; at 3 it is red and weak, and the sky still
+  // blue.
+  const std::string sun = "--aov light --sun 0,38", clear = " --sky clear";
+  const Image high = picture(sun + clear), low = picture("--aov light --sun 0,3" + clear),
+              dull = picture(sun + " --sky clear:9"), own = picture(sun + ",2,2,2" + clear);
+  const auto at = [](const Image& image, const char* channel) { return image.at(channel, 8, 6); };
+  EXPECT_GT(at(low, "light_sun.R"), 3 * at(low, "light_sun.B"));
+  EXPECT_LT(at(low, "light_sun.G"), 0.5f * at(high, "light_sun.G"));
+  EXPECT_GT(at(high, "light_sky.B"), at(high, "light_sky.R"));
+  EXPECT_LT(at(dull, "light_sun.G"), at(high, "light_sun.G"));
+  EXPECT_EQ(at(own, "light_sun.R"), at(own, "light_sun.B"));
+  const Image black = picture(sun + clear + " --ground-albedo 0"),
+              white = picture(sun + clear + " --ground-albedo 1");
+  EXPECT_GT(at(white, "light_sky.G"), at(black, "light_sky.G"));
+}
+
 TEST_F(LightOptions, DeepShadowsGoThroughFiles) {
   const std::string light = "--extinction 2 --sky 0,0,0 --octaves 1 --sun 90,38 ";
   const Image plain = picture(light);
@@ -102,6 +119,9 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
       {"--shadow-detail 3", "--shadow-detail: got '3'", 2},
       {"--shadow-multiplier 1,2", "--shadow-multiplier: got '1,2'", 2},
       {"--sky 1,2", "--sky: got '1,2'", 2},
+      {"--sky clear:0.5", "--sky: got 'clear:0.5'", 2},
+      {"--sky clear:2,3", "--sky: got 'clear:2,3'", 2},
+      {"--sky clear --ground-albedo 1.5", "--ground-albedo: got '1.5'", 2},
       {"--write-deep-shadow a.png", "--write-deep-shadow: got 'a.png'", 2},
       {"--shadow-multiplier lamp=1,1,1", "no light is called 'lamp'; there are: sun", 1},
       {"--sun a=1,2 --point a=1,2,3,4", "the name 'a' is taken twice", 1},

@@ -1,0 +1,354 @@
+// Lengths in kilometres. A ray sees on its way what air and haze scatter towards it of the sun's light, which
+// has come through the air itself (a table over height and the sun's place), and of light that has been
+// scattered before. For the latter all scatterings but the last are taken to be alike in all directions
+// (Hillaire 2020, section 5): a place sends on a share f of what it gets, so that the second scattering L
+// becomes L (1 + f + f^2 + ...) = L / (1 - f), a second table.
+//
+// Limits: three wavelengths stand for colours; light is not polarised; the ground is flat grey.
+#include "nephele/render/scene/clear_sky.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
+
+namespace nephele {
+
+namespace {
+
+constexpr double kGround = 6360, kTop = 6460;
+// Extinction of air and of ozone per kilometre where they are densest, and how high they reach.
+constexpr double kAir[3] = {5.802e-3, 13.558e-3, 33.1e-3}, kOzone[3] = {0.650e-3, 1.881e-3, 0.085e-3};
+constexpr double kAirHeight = 8, kHazeHeight = 1.2, kOzoneMiddle = 25, kOzoneHalf = 15;
+// What haze scatters of what it takes, and how much more it takes at 680 and 440 nanometres than at 550
+// (Angstrom's exponent of 1.3).
+constexpr double kHazeAlbedo = 0.9, kHazeColour[3] = {0.759, 1, 1.337};
+// Of Cornette's and Shanks' phase function for haze.
+constexpr double kHazeCosine = 0.76;
+// The sun's colour outside of the atmosphere, seen by eyes that are used to daylight, times what gives its
+// light the luminance that ClearSky::sunlight states.
+constexpr double kSun[3] = {1.474 * 2.734, 1.8504 * 2.734, 1.91198 * 2.734};
+constexpr double kSunRadius = 0.00466;
+
+using Colour = std::array<double, 3>;
+
+double square(double x) {
+  return x * x;
+}
+
+// What is at a height.
+struct Air {
+  Colour air, haze, taken;
+};
+
+struct Atmosphere {
+  double hazeExtinction;
+
+  Air at(double radius) const {
+    const double height = std::max(radius - kGround, 0.0);
+    const double air = std::exp(-height / kAirHeight),
+                 haze = std::exp(-height / kHazeHeight) * hazeExtinction,
+                 ozone = std::max(0.0, 1 - std::fabs(height - kOzoneMiddle) / kOzoneHalf);
+    Air result;
+    for (std::size_t c = 0; c != 3; ++c) {
+      result.air[c] = kAir[c] * air;
+      result.haze[c] = kHazeAlbedo * kHazeColour[c] * haze;
+      result.taken[c] = result.air[c] + kHazeColour[c] * haze + kOzone[c] * ozone;
+    }
+    return result;
+  }
+};
+
+// Along a ray from `radius` upwards by the cosine `rise`.
+double radiusAfter(double radius, double rise, double way) {
+  return std::sqrt(std::max(square(way) + 2 * radius * rise * way + square(radius), 0.0));
+}
+double wayToTop(double radius, double rise) {
+  return -radius * rise + std::sqrt(std::max(square(radius * rise) - square(radius) + square(kTop), 0.0));
+}
+// Negative if it passes the ground by.
+double wayToGround(double radius, double rise) {
+  const double within = square(radius * rise) - square(radius) + square(kGround);
+  return rise < 0 && within >= 0 ? std::max(-radius * rise - std::sqrt(within), 0.0) : -1.0;
+}
+double horizonRise(double radius) {
+  return -std::sqrt(std::max(1 - square(kGround / radius), 0.0));
+}
+
+// A table of colours over [0, 1]^2, interpolated.
+template <int kWidth, int kHeight>
+struct Table {
+  std::vector<Colour> values = std::vector<Colour>(std::size_t(kWidth * kHeight));
+
+  template <class Value>
+  void fill(const Value& value) {
+    parallelFor(std::size_t(kHeight), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t y = begin; y != end; ++y)
+        for (std::size_t x = 0; x != kWidth; ++x)
+          values[y * kWidth + x] = value(double(x) / (kWidth - 1), double(y) / (kHeight - 1));
+    });
+  }
+  Colour operator()(double u, double v) const {
+    const double x = std::clamp(u, 0.0, 1.0) * (kWidth - 1), y = std::clamp(v, 0.0, 1.0) * (kHeight - 1);
+    const auto x0 = std::min(std::size_t(x), std::size_t(kWidth - 2)),
+               y0 = std::min(std::size_t(y), std::size_t(kHeight - 2));
+    const double fx = x - double(x0), fy = y - double(y0);
+    const Colour* at = values.data() + y0 * kWidth + x0;
+    Colour result;
+    for (std::size_t c = 0; c != 3; ++c)
+      result[c] = (1 - fy) * ((1 - fx) * at[0][c] + fx * at[1][c]) +
+                  fy * ((1 - fx) * at[kWidth][c] + fx * at[kWidth + 1][c]);
+    return result;
+  }
+};
+
+// What a beam from outside keeps down to a place, for beams that do not meet the ground. Places in the table
+// are those of Bruneton and Neyret, fine about the horizon.
+class Transmittance {
+ public:
+  explicit Transmittance(const Atmosphere& atmosphere) {
+    table_.fill([&](double u, double v) {
+      const double toHorizon = v * kMost, radius = std::sqrt(square(toHorizon) + square(kGround));
+      const double least = kTop - radius, most = toHorizon + kMost, way = least + u * (most - least);
+      const double rise =
+          way > 0 ? std::clamp((square(kTop) - square(radius) - square(way)) / (2 * radius * way), -1.0, 1.0)
+                  : 1.0;
+      // From where the ray is lowest to both of its ends, in steps that grow.
+      const double lowest = std::clamp(-radius * rise, 0.0, way);
+      constexpr int kSteps = 12;
+      // Gauss' rule of two points in each.
+      constexpr double kPoints[2] = {0.5 - 0.28867513, 0.5 + 0.28867513};
+      Colour depth{};
+      for (const double part : {-lowest, way - lowest})
+        for (int i = 0; i != kSteps; ++i) {
+          const double from = std::pow(double(i) / kSteps, 3), to = std::pow((i + 1.0) / kSteps, 3);
+          for (const double point : kPoints) {
+            const Air air =
+                atmosphere.at(radiusAfter(radius, rise, lowest + part * (from + point * (to - from))));
+            for (std::size_t c = 0; c != 3; ++c) depth[c] += air.taken[c] * std::fabs(part) * (to - from) / 2;
+          }
+        }
+      return Colour{std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])};
+    });
+  }
+
+  // Of the sun, whose disc the ground may hide.
+  Colour ofSun(double radius, double rise) const {
+    const double horizon = horizonRise(radius), shown = (rise - horizon) / (2 * kSunRadius) + 0.5;
+    if (shown <= 0) return {};
+    const double above = std::max(rise, horizon);
+    const double toHorizon = std::sqrt(std::max(square(radius) - square(kGround), 0.0));
+    const double least = kTop - radius, most = toHorizon + kMost;
+    Colour result = table_((wayToTop(radius, above) - least) / (most - least), toHorizon / kMost);
+    for (double& value : result) value *= std::min(shown, 1.0);
+    return result;
+  }
+
+ private:
+  inline static const double kMost = std::sqrt(square(kTop) - square(kGround));
+  Table<128, 64> table_;
+};
+
+// What a ray meets: along it, of one or two kinds of light, and the ground if that is where it ends.
+template <std::size_t kKinds>
+struct Seen {
+  std::array<Colour, kKinds> light{};
+  Colour left{1, 1, 1};
+  double way = 0;
+  bool isGround = false;
+};
+
+// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray.
+template <std::size_t kKinds, class Sources>
+Seen<kKinds> lookAlong(const Atmosphere& atmosphere, double radius, double rise, int steps,
+                       const Sources& sourcesAt) {
+  Seen<kKinds> seen;
+  const double ground = wayToGround(radius, rise);
+  seen.isGround = ground >= 0;
+  seen.way = seen.isGround ? ground : wayToTop(radius, rise);
+  double before = 0;
+  for (int i = 0; i != steps; ++i) {
+    // Shorter near the eye, where the air is densest.
+    const double end = seen.way * square((i + 1.0) / steps), length = end - before,
+                 way = before + 0.5 * length;
+    const double there = radiusAfter(radius, rise, way);
+    const Air air = atmosphere.at(there);
+    const std::array<Colour, kKinds> sources = sourcesAt(there, way, air);
+    for (std::size_t c = 0; c != 3; ++c) {
+      const double step = std::exp(-air.taken[c] * length),
+                   whole = seen.left[c] * (air.taken[c] > 1e-12 ? (1 - step) / air.taken[c] : length);
+      for (std::size_t k = 0; k != kKinds; ++k) seen.light[k][c] += whole * sources[k][c];
+      seen.left[c] *= step;
+    }
+    before = end;
+  }
+  return seen;
+}
+
+// The cosine between a direction and up after a way, both given at its begin: `along` is that between the
+// direction and the ray.
+double riseAfter(double radius, double rise, double along, double way, double radiusThere) {
+  return std::clamp((radius * rise + way * along) / radiusThere, -1.0, 1.0);
+}
+
+}  // namespace
+
+struct ClearSky::Data {
+  Atmosphere atmosphere;
+  Transmittance transmittance;
+  Colour ground;
+  double radius;
+  Vec3d sun;
+  // Light that was scattered before, over what the sun sends, by the sun's rise and the height.
+  Table<32, 16> scattered;
+  // Irradiance of the ground by the sky, over that of the sun outside.
+  Colour skyOnGround{};
+
+  explicit Data(const Options& options)
+      : atmosphere{(double(options.turbidity) - 1) * kAir[1] * kAirHeight / kHazeHeight},
+        transmittance(atmosphere),
+        ground{double(options.groundAlbedo.x), double(options.groundAlbedo.y),
+               double(options.groundAlbedo.z)},
+        radius(kGround + std::max(double(options.height) * 1e-3, 1e-3)),
+        sun(normalize(Vec3d(options.sun))) {
+    scattered.fill([&](double u, double v) { return scatteredAt(heightAt(v), 2 * u - 1); });
+    // By Gauss' rule of three points in the square of the sine, which integrates the cosine.
+    constexpr double kNodes[3] = {0.112702, 0.5, 0.887298}, kWeights[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    constexpr int kTurns = 16;
+    for (int i = 0; i != 3; ++i)
+      for (int turn = 0; turn != kTurns; ++turn) {
+        const double rise = std::sqrt(kNodes[i]), flat = std::sqrt(1 - kNodes[i]),
+                     angle = 2 * double(kPi) * (turn + 0.5) / kTurns;
+        const Colour light =
+            look(kGround + 1e-3, {flat * std::cos(angle), rise, flat * std::sin(angle)}).light[0];
+        for (std::size_t c = 0; c != 3; ++c) skyOnGround[c] += double(kPi) * kWeights[i] / kTurns * light[c];
+      }
+  }
+
+  static double heightAt(double v) { return kGround + 1e-3 + square(v) * (kTop - kGround - 2e-3); }
+
+  Colour scatteredBefore(double there, double sunRise) const {
+    return scattered(0.5 * (sunRise + 1), std::sqrt(std::max((there - kGround) / (kTop - kGround), 0.0)));
+  }
+
+  Colour scatteredAt(double there, double sunRise) const {
+    // One side of the sun's plane is like the other.
+    constexpr int kRises = 8, kTurns = 4, kSteps = 14;
+    Colour second{}, share{};
+    const double sunFlat = std::sqrt(std::max(1 - square(sunRise), 0.0));
+    for (int i = 0; i != kRises; ++i)
+      for (int turn = 0; turn != kTurns; ++turn) {
+        const double rise = (i + 0.5) * 2 / kRises - 1, flat = std::sqrt(1 - square(rise));
+        const double along = rise * sunRise + flat * sunFlat * std::cos(double(kPi) * (turn + 0.5) / kTurns);
+        // What is scattered of the sun's light, and of light that is 1 everywhere.
+        const auto seen =
+            lookAlong<2>(atmosphere, there, rise, kSteps, [&](double r, double way, const Air& air) {
+              const Colour lit = transmittance.ofSun(r, riseAfter(there, sunRise, along, way, r));
+              std::array<Colour, 2> sources;
+              for (std::size_t c = 0; c != 3; ++c) {
+                sources[1][c] = air.air[c] + air.haze[c];
+                sources[0][c] = sources[1][c] * lit[c] / (4 * double(kPi));
+              }
+              return sources;
+            });
+        Colour sent = seen.light[0];
+        if (seen.isGround) {
+          const double onGround = riseAfter(there, sunRise, along, seen.way, kGround);
+          const Colour lit = transmittance.ofSun(kGround + 1e-3, onGround);
+          for (std::size_t c = 0; c != 3; ++c)
+            sent[c] += seen.left[c] * ground[c] / double(kPi) * lit[c] * std::max(onGround, 0.0);
+        }
+        for (std::size_t c = 0; c != 3; ++c) {
+          second[c] += sent[c] / (kRises * kTurns);
+          share[c] += seen.light[1][c] / (kRises * kTurns);
+        }
+      }
+    for (std::size_t c = 0; c != 3; ++c) second[c] /= 1 - std::min(share[c], 0.999);
+    return second;
+  }
+
+  // Of light over what the sun sends outside.
+  Seen<1> look(double from, const Vec3d& towards) const {
+    constexpr int kSteps = 24;
+    const double along = dot(towards, sun), square1 = square(along);
+    const double air = 3 / (16 * double(kPi)) * (1 + square1);
+    constexpr double g = kHazeCosine;
+    const double haze = 3 / (8 * double(kPi)) * (1 - g * g) * (1 + square1) /
+                        ((2 + g * g) * std::pow(1 + g * g - 2 * g * along, 1.5));
+    return lookAlong<1>(atmosphere, from, towards.y, kSteps, [&](double r, double way, const Air& there) {
+      const double sunRise = riseAfter(from, sun.y, along, way, r);
+      const Colour lit = transmittance.ofSun(r, sunRise), before = scatteredBefore(r, sunRise);
+      Colour source;
+      for (std::size_t c = 0; c != 3; ++c)
+        source[c] =
+            (there.air[c] * air + there.haze[c] * haze) * lit[c] + (there.air[c] + there.haze[c]) * before[c];
+      return std::array<Colour, 1>{source};
+    });
+  }
+};
+
+ClearSky::ClearSky(const Options& options) {
+  require(isFinite(options.sun) && length(options.sun) > 0,
+          "sky: the direction towards the sun must be finite and not zero");
+  require(options.turbidity >= 1 && options.turbidity <= 10,
+          fmt::format("sky: expected a turbidity within [1, 10], got {}", options.turbidity));
+  require(options.height >= 0 && options.height <= 20000,
+          fmt::format("sky: expected a height within [0, 20000] metres, got {}", options.height));
+  for (int c = 0; c != 3; ++c)
+    require(
+        options.groundAlbedo[c] >= 0 && options.groundAlbedo[c] <= 1,
+        fmt::format("sky: expected an albedo of the ground within [0, 1], got {}", options.groundAlbedo[c]));
+  data_ = std::make_shared<const Data>(options);
+}
+
+Vec3f ClearSky::sunlight() const {
+  const Colour left = data_->transmittance.ofSun(data_->radius, data_->sun.y);
+  return {float(kSun[0] * left[0]), float(kSun[1] * left[1]), float(kSun[2] * left[2])};
+}
+
+Vec3f ClearSky::radiance(const Vec3f& towards) const {
+  const Vec3d way = normalize(Vec3d(towards));
+  const Seen<1> seen = data_->look(data_->radius, way);
+  Colour light = seen.light[0];
+  if (seen.isGround) {
+    const double sunRise = riseAfter(data_->radius, data_->sun.y, dot(way, data_->sun), seen.way, kGround);
+    const Colour lit = data_->transmittance.ofSun(kGround + 1e-3, sunRise);
+    for (std::size_t c = 0; c != 3; ++c)
+      light[c] += seen.left[c] * data_->ground[c] / double(kPi) *
+                  (lit[c] * std::max(sunRise, 0.0) + data_->skyOnGround[c]);
+  }
+  return {float(kSun[0] * light[0]), float(kSun[1] * light[1]), float(kSun[2] * light[2])};
+}
+
+// The half to the left of the sun is that to its right.
+Environment ClearSky::map(int rows, float intensity) const {
+  require(rows >= 2 && rows <= 4096 && rows % 2 == 0,
+          fmt::format("sky: expected an even number of rows within [2, 4096], got {}", rows));
+  const int width = 2 * rows;
+  const double sunAzimuth = std::atan2(data_->sun.x, data_->sun.z);
+  std::vector<Vec3f> values(std::size_t(width) * std::size_t(rows));
+  parallelFor(std::size_t(rows), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y != end; ++y)
+      for (int x = 0; x != rows; ++x) {
+        const double theta = double(kPi) * (double(y) + 0.5) / rows,
+                     turn = sunAzimuth + 2 * double(kPi) * (x + 0.5) / width;
+        const Vec3f colour = radiance(Vec3f(
+            Vec3d{std::sin(theta) * std::sin(turn), std::cos(theta), std::sin(theta) * std::cos(turn)}));
+        values[y * std::size_t(width) + std::size_t(rows - 1 - x)] = colour;
+        values[y * std::size_t(width) + std::size_t(rows + x)] = colour;
+      }
+  });
+  Environment::Options options;
+  options.intensity = intensity;
+  options.hasSpots = false;
+  // The middle of the picture is the sun's azimuth.
+  options.rotationDegrees = float(sunAzimuth * 180 / double(kPi));
+  return Environment(width, rows, std::move(values), options);
+}
+
+}  // namespace nephele
