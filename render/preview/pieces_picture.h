@@ -16,7 +16,7 @@ struct PiecesPictureOptions {
   /// How far pieces are moved apart, see `explodedOffsets`.
   double explode = 0.4;
   /// Rays per pixel, fewer where there is only open ground.
-  int samples = 48;
+  int samples = 8;
 };
 
 /// Colours that tell `count` pieces apart, linear, all different: pieces that touch get colours far from each

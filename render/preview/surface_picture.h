@@ -15,7 +15,7 @@ struct SurfacePictureOptions {
   /// Share of the frame left free on each side.
   float margin = 0.05f;
   /// Rays per pixel, fewer where there is only open ground.
-  int samples = 48;
+  int samples = 8;
 };
 
 /// Objects without a volume, standing on a ground that fades into the backdrop, in the soft light of a lamp
@@ -27,7 +27,7 @@ Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOp
 
 /// Memory, in bytes, that `pictureSurfaces` takes beside its objects. Measured.
 constexpr double estimateSurfacePictureBytes(int width, int height) {
-  return 32.0 * width * height;
+  return 130.0 * width * height;
 }
 
 }  // namespace nephele

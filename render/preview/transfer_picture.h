@@ -15,7 +15,7 @@ struct TransferPictureOptions {
   float azimuthDegrees = 30.0f, elevationDegrees = 12.0f;
   /// Fields of a chess board across the unit square of texture coordinates, where there is no texture.
   int checkers = 32;
-  int samples = 48;
+  int samples = 8;
 };
 
 /// The reference on the left and the object on the right, equally large and seen from the same side, with a
