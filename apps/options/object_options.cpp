@@ -27,26 +27,38 @@ bool hasCoordinates(const Mesh& mesh) {
   });
 }
 
+std::vector<SurfaceObject> painted(const ObjectOptions& options, const std::vector<std::string>& paths,
+                                   const Vec3f& colour, double mostBytes) {
+  std::vector<SurfaceObject> result;
+  const auto image = options.texture.empty() ? nullptr
+                                             : std::make_shared<const Image>(readLinearImage(
+                                                   options.texture, options.textureEncoding, mostBytes));
+  for (const std::string& path : paths) {
+    SurfaceObject object{readObject(path), options.colour.value_or(colour), options.checkers, image};
+    if ((options.checkers > 0 || image) && !hasCoordinates(object.mesh))
+      throw Error(fmt::format("{}: has no texture coordinates, which --{} needs", path,
+                              image ? "texture" : "checker"));
+    result.push_back(std::move(object));
+  }
+  return result;
+}
+
 }  // namespace
 
 void addObjectOptions(CLI::App& app, ObjectOptions& options) {
-  CLI::Option* object =
-      addInputs(app, "--object", options.objects,
-                "Opaque object beside the volume: a mesh, or a level set (.vdb); may be given again.");
+  addInputs(app, "--object", options.objects,
+            "Opaque object beside the volume: a mesh, or a level set (.vdb); may be given again.");
   addInputs(app, "--holdout-object", options.holdouts,
             "The same as a holdout: hides what is behind it, and is not seen itself.");
   addNumbers(
       app, "--object-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
       "Share of the light that objects scatter.")
-      ->needs(object)
       ->default_str("0.5,0.5,0.5");
   addCount(app, "--checker", options.checkers, 0, 10000,
-           "Fields of a chess board across the texture coordinates of objects; 0: none.")
-      ->needs(object);
+           "Fields of a chess board across the texture coordinates of objects; 0: none.");
   app.add_option("--texture", options.texture,
                  "Picture (.png, .exr) on the texture coordinates of objects; times their colour.")
-      ->type_name("FILE")
-      ->needs(object);
+      ->type_name("FILE");
   addColourEncoding(app, "--texture-encoding", options.textureEncoding,
                     "How its numbers stand for light; auto: as the file says.");
   app.add_flag("--backdrop", options.backdrop,
@@ -65,17 +77,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
 
 std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, double mostBytes) const {
   if (any()) require(!volume.isEmpty(), "objects and the ground stand in a volume that is not empty");
-  std::vector<SurfaceObject> all;
-  const auto image =
-      texture.empty() ? nullptr
-                      : std::make_shared<const Image>(readLinearImage(texture, textureEncoding, mostBytes));
-  for (const std::string& path : objects) {
-    SurfaceObject object{readObject(path), colour, checkers, image};
-    if ((checkers > 0 || image) && !hasCoordinates(object.mesh))
-      throw Error(fmt::format("{}: has no texture coordinates, which --{} needs", path,
-                              image ? "texture" : "checker"));
-    all.push_back(std::move(object));
-  }
+  std::vector<SurfaceObject> all = painted(*this, objects, {0.5f, 0.5f, 0.5f}, mostBytes);
   for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path), .isHoldout = true});
   if (ground) {
     const Box& box = volume.worldBounds();
@@ -87,7 +89,18 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
   return all.empty() ? nullptr : std::make_shared<const Surfaces>(std::move(all));
 }
 
+// A picture shows them in its own light, which suits grey.
+std::vector<SurfaceObject> ObjectOptions::shapes(const std::vector<std::string>& paths,
+                                                 double mostBytes) const {
+  return painted(*this, paths, {0.62f, 0.6f, 0.57f}, mostBytes);
+}
+
 void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const {
+  const std::pair<const char*, bool> ofObjects[] = {
+      {"--object-colour", colour.has_value()}, {"--checker", checkers > 0}, {"--texture", !texture.empty()}};
+  for (const auto& [option, isGiven] : ofObjects)
+    if (isGiven && objects.empty())
+      throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");
   picture.render.surfaces = surfaces(volume, mostBytes);
 }
 

@@ -16,7 +16,7 @@ namespace nephele::apps {
 /// What stands in the picture beside the volume.
 struct ObjectOptions {
   std::vector<std::string> objects, holdouts;
-  Vec3f colour{0.5f, 0.5f, 0.5f};
+  std::optional<Vec3f> colour;
   int checkers = 0;
   std::string texture;
   ColourEncoding textureEncoding = ColourEncoding::automatic;
@@ -25,10 +25,13 @@ struct ObjectOptions {
   std::optional<double> groundHeight;
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
 
+  /// Of meshes and level sets that are the picture's only subject. @throws Error naming the file.
+  std::vector<SurfaceObject> shapes(const std::vector<std::string>& paths, double mostBytes) const;
   bool any() const { return !objects.empty() || !holdouts.empty() || ground; }
   /// Reads the files; null where there are no objects. @throws Error naming the file.
   std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, double mostBytes) const;
-  /// Puts them into `picture`. @throws Error as `surfaces`.
+  /// Puts them into `picture`. @throws CLI::Error for options of objects where there are none, Error as
+  /// `surfaces`.
   void addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const;
 };
 

@@ -205,6 +205,14 @@ std::map<std::string, std::string> PictureOptions::metadata(const Run& run) cons
   return metadata;
 }
 
+void tellWork(const RenderResult& result, Run& run) {
+  run.stats["rays"] = result.rays;
+  run.stats["samples"] = result.samples;
+  if (result.deep) run.stats["deep_samples"] = result.deep->sampleCount();
+  run.stats["light_seconds"] = result.lightSeconds;
+  run.stats["march_seconds"] = result.marchSeconds;
+}
+
 std::size_t noteNotFinite(const std::string& path, const Image& image, const Run& run) {
   const std::size_t count = notFiniteCount(image);
   if (count > 0)

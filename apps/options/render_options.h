@@ -67,6 +67,9 @@ struct PictureOptions : CameraOptions {
 /// Says so if the picture for `path` holds values that no file can; returns how many.
 std::size_t noteNotFinite(const std::string& path, const Image& image, const Run& run);
 
+/// Puts what a picture took into the statistics of `run`.
+void tellWork(const RenderResult& result, Run& run);
+
 /// Declares the options on `app`.
 void addPictureOptions(CLI::App& app, PictureOptions& options);
 

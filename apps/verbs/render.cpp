@@ -3,6 +3,7 @@
 #include "apps/options/live_picture.h"
 #include "apps/options/object_options.h"
 #include "apps/options/render_options.h"
+#include "apps/options/shapes_picture.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
 #include "nephele/render/scene/backdrop.h"
@@ -18,8 +19,10 @@ struct RenderVerbOptions {
 };
 
 void bindOptions(CLI::App& app, RenderVerbOptions& options) {
-  app.add_option("input", options.inputs,
-                 "Densities to look at (.vdb, .nvdb); where they overlap they add up.")
+  app.add_option(
+         "input", options.inputs,
+         "Densities to look at (.vdb, .nvdb); where they overlap they add up. Or meshes and level sets "
+         "alone, shaded quickly in a light of their own.")
       ->required()
       ->type_name("FILE");
   addOutput(app, "-o,--output", options.output, {".exr"}, "Picture to write: linear, premultiplied.")
@@ -50,6 +53,9 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
+  if (areShapes(options.inputs))
+    return writeShapesPicture(options.inputs, options.objects, options.picture,
+                              {options.output, options.preview}, run);
   RenderVolume volume =
       readVolumes(options.inputs, options.picture.volumes,
                   {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
@@ -64,22 +70,17 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   LivePicture live(picture.displayServer, options.output, picture.render);
   RenderResult result = picture.picture(volume, camera, run);
   if (options.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
-  run.begin("write");
   const auto metadata = picture.metadata(run);
+  run.begin("write");
   if (result.deep)
     writeExrPair({options.output, options.deep}, result.image, *result.deep, camera, metadata);
   else
     writeExr(options.output, result.image, camera, metadata);
   if (!options.preview.empty()) writePng(options.preview, result.image, picture.screen, metadata);
-
   live.complete(result.image);
   live.finish(run);
   run.stats["values_not_finite"] = noteNotFinite(options.output, result.image, run);
-  run.stats["rays"] = result.rays;
-  run.stats["samples"] = result.samples;
-  if (result.deep) run.stats["deep_samples"] = result.deep->sampleCount();
-  run.stats["light_seconds"] = result.lightSeconds;
-  run.stats["march_seconds"] = result.marchSeconds;
+  tellWork(result, run);
   run.stats["extinction"] = *picture.extinction;
   run.result(fmt::format("{}: {}x{}, extinction {:g} per world unit", options.output, camera.width(),
                          camera.height(), *picture.extinction));
@@ -88,7 +89,8 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
 }  // namespace
 
 Verb renderVerb() {
-  return verbOf("render", "Makes a picture of a density: a cloud, smoke, any fog volume.",
+  return verbOf("render",
+                "Makes a picture of a density (a cloud, smoke, any fog volume), or a quick one of meshes.",
                 "nephele render cloud.vdb -o cloud.exr --preview cloud.png --view 25,5 --sun 90,38",
                 bindOptions, renderVolume);
 }

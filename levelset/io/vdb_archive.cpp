@@ -9,6 +9,7 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 
+#include <algorithm>
 #include <istream>
 #include <vector>
 
@@ -61,8 +62,10 @@ class VdbArchive : public openvdb::io::Archive {
     }
     if (inputHasGridOffsets()) {
       wantParents(entries);
+      // Where no values are asked for, what else is said of the grids is.
+      const bool onlyLabels = std::ranges::none_of(entries, &Entry::wanted);
       for (Entry& entry : entries)
-        if (entry.wanted) {
+        if (entry.wanted || onlyLabels) {
           entry.descriptor.seekToGrid(stream_);
           readValues(entry);
         }
@@ -96,12 +99,13 @@ class VdbArchive : public openvdb::io::Archive {
   void readValues(Entry& entry) {
     const std::string name = entry.descriptor.gridName();
     try {
-      const bool checkable = isCheckable(*entry.grid);
-      checkGrid(bytes_, *entry.grid, checkable && !entry.descriptor.isInstance());
-      if (checkable) {
+      const bool checkable = isCheckable(*entry.grid),
+                 hasValues = checkable && (entry.wanted || !inputHasGridOffsets());
+      checkGrid(bytes_, *entry.grid, hasValues && !entry.descriptor.isInstance());
+      if (hasValues) {
         readGrid(entry.grid, entry.descriptor, stream_);
       } else if (inputHasGridOffsets()) {
-        // Nothing here computes with points: what their metadata tells of them suffices.
+        // Nothing here computes with points, either: what their metadata tells of them suffices.
         readGridCompression(stream_);
         entry.grid->readMeta(stream_);
         entry.grid->readTransform(stream_);

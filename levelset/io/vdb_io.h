@@ -74,7 +74,7 @@ std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid);
 enum class VdbValues { scalar, vector, other };
 VdbValues valuesOf(const VdbGrid& grid);
 
-/// The names and types of the grids of a file; their values are not read. @throws Error as readVdbFile.
+/// The grids of a file without their values: names, types, labels. @throws Error as readVdbFile.
 std::vector<VdbGrid> readVdbHeaders(const std::string& path);
 
 /// "it holds 'density' (float), 'v' (vec3s)": for messages.

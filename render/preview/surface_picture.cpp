@@ -78,7 +78,8 @@ struct Scene {
   const Surfaces& surfaces;
   const Camera& camera;
   Vec3d centre, towardsLamp;
-  double size, ground, pixelAngle;
+  /// A pixel is `pixelAngle` times the distance wide, and `pixelWidth` more.
+  double size, ground, pixelAngle, pixelWidth;
 
   Seen look(std::size_t x, std::size_t y, int samples) const {
     Numbers shift, u;
@@ -142,7 +143,7 @@ struct Scene {
     seen.backdrop += fade;
     seen.normal += Vec3f(normal);
     seen.place += Vec3f(met - centre);
-    seen.size += float(distance * pixelAngle);
+    seen.size += float(distance * pixelAngle + pixelWidth);
     ++sums.places;
     if (!looks && sums.looks > 0) return;
     ++sums.looks;
@@ -241,13 +242,8 @@ void smooth(std::vector<Seen>& pixels, int width, int height) {
   }
 }
 
-}  // namespace
-
-Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options,
-                      const Progress& progress) {
-  require(!objects.empty(), "picture: there are no objects");
-  require(options.samples >= 1 && options.samples <= 65536,
-          fmt::format("picture: samples must be from 1 to 65536, got {}", options.samples));
+Camera cameraOf(const std::vector<SurfaceObject>& objects, const SurfacePictureOptions& options) {
+  if (options.camera) return *options.camera;
   std::vector<Vec3f> points;
   for (const SurfaceObject& object : objects)
     for (const std::uint32_t v : object.mesh.corners) points.emplace_back(object.mesh.positions[v]);
@@ -255,15 +251,26 @@ Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOp
   frame.width = options.width;
   frame.height = options.height;
   frame.fovDegrees = 26.0f;
-  const Camera camera =
-      Camera::framing(points, options.azimuthDegrees, options.elevationDegrees, frame, options.margin);
+  return Camera::framing(points, options.azimuthDegrees, options.elevationDegrees, frame, options.margin);
+}
+
+}  // namespace
+
+Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options,
+                      const Progress& progress) {
+  require(!objects.empty(), "picture: there are no objects");
+  require(options.samples >= 1 && options.samples <= 65536,
+          fmt::format("picture: samples must be from 1 to 65536, got {}", options.samples));
+  const Camera camera = cameraOf(objects, options);
   progress.begin("picture");
   const Surfaces surfaces(std::move(objects));
   const Box& box = surfaces.box();
+  const PixelBox window = camera.window();
+  const double middleX = 0.5 * (window.x0 + window.x1), middleY = 0.5 * (window.y0 + window.y1);
+  const Ray ahead = camera.ray(middleX, middleY), beside = camera.ray(middleX + 1, middleY);
   // Over the left shoulder of the camera.
-  const double azimuth = (double(options.azimuthDegrees) - 52) * M_PI / 180, elevation = 0.86;
-  const Vec3d ahead = camera.ray(0.5 * options.width, 0.5 * options.height).direction,
-              beside = camera.ray(0.5 * options.width + 1, 0.5 * options.height).direction;
+  const double azimuth = std::atan2(-ahead.direction.x, -ahead.direction.z) - 52 * M_PI / 180,
+               elevation = 0.86;
   const Scene scene{
       surfaces,
       camera,
@@ -271,23 +278,28 @@ Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOp
       {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)},
       double(length(box.size())) / 2,
       double(box.min.y),
-      length(beside - ahead)};
+      length(beside.direction - ahead.direction),
+      length(beside.origin - ahead.origin)};
 
-  const std::size_t width = std::size_t(options.width), count = width * std::size_t(options.height);
-  std::vector<Seen> pixels(count);
+  const auto width = std::size_t(window.width()), height = std::size_t(window.height());
+  std::vector<Seen> pixels(width * height);
   parallelFor(
-      std::size_t(options.height), 2,
+      height, 2,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t y = begin; y < end; ++y)
-          for (std::size_t x = 0; x < width; ++x) pixels[y * width + x] = scene.look(x, y, options.samples);
+          for (std::size_t x = 0; x < width; ++x)
+            pixels[y * width + x] =
+                scene.look(std::size_t(window.x0) + x, std::size_t(window.y0) + y, options.samples);
       },
       progress);
-  smooth(pixels, options.width, options.height);
+  smooth(pixels, window.width(), window.height());
   Image image;
-  image.width = options.width;
-  image.height = options.height;
+  image.width = window.width();
+  image.height = window.height();
+  if (window.width() != camera.width() || window.height() != camera.height())
+    image.display = Image::Display{window.x0, window.y0, camera.width(), camera.height()};
   for (const char* name : {"R", "G", "B", "A"}) image.add(name);
-  for (std::size_t at = 0; at != count; ++at) {
+  for (std::size_t at = 0; at != pixels.size(); ++at) {
     const Seen& seen = pixels[at];
     const Vec3f light = seen.facing * kLamp * seen.lamp + seen.colour * seen.sky + kBackdrop * seen.backdrop;
     for (int c = 0; c < 3; ++c) image.channels[std::size_t(c)].values[at] = light[c];

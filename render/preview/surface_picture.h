@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
+#include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/surfaces.h"
 
 namespace nephele {
@@ -12,6 +14,8 @@ struct SurfacePictureOptions {
   int width = 1280, height = 720;
   /// Where the camera stands; it frames all objects.
   float azimuthDegrees = 0.0f, elevationDegrees = 14.0f;
+  /// In place of all these; its lens and shutter are left out.
+  std::optional<Camera> camera{};
   /// Share of the frame left free on each side.
   float margin = 0.05f;
   /// Rays per pixel, fewer where there is only open ground.

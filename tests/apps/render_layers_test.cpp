@@ -233,6 +233,47 @@ TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
               1.0f, 0.02f);
 }
 
+TEST_F(RenderLayers, MeshesAndLevelSetsAloneAreShadedQuickly) {
+  const TemporaryFolder folder;
+  const std::string ball = folder.file("ball.obj"), levelSet = folder.file("ball.vdb");
+  const auto shape = bakeGrid(
+      sphere({0, 0, 0}, 0.5f),
+      {.voxelSize = 0.05f, .box = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}, .band = {-0.2f, 0.2f}});
+  writeVdbFile(levelSet, {toVdb(*shape, {"surface", VdbGridInfo::Class::levelSet})}, {});
+  ASSERT_EQ(runProgram("mesh " + levelSet + " -o " + ball + " --quiet").exitCode, 0);
+  const auto make = [&](const std::string& input, const std::string& more = {}) {
+    const ProgramResult result =
+        runProgram("render " + input + " -o " + folder.file("a.exr") + " --preview " + folder.file("a.png") +
+                   " --size 48x36 --quiet " + more);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file("a.exr"));
+  };
+  // The same surface, by marching cubes.
+  const Image mesh = make(ball), field = make(levelSet), red = make(ball, "--object-colour 0.5,0,0");
+  for (const char* channel : {"R", "G", "B"}) {
+    EXPECT_NEAR(mesh.at(channel, 24, 18), field.at(channel, 24, 18), 0.01f);
+    EXPECT_GT(mesh.at(channel, 24, 18), 0.1f);
+  }
+  EXPECT_EQ(mesh.at("A", 0, 0), 1.0f);
+  EXPECT_EQ(red.at("G", 24, 18), 0.0f);
+  EXPECT_GT(red.at("R", 24, 18), 0.1f);
+  EXPECT_EQ(make(ball, "--threads 1").channel("R").values, mesh.channel("R").values);
+  const struct {
+    std::string arguments;
+    int exitCode;
+    std::string message;
+  } cases[] = {{ball + " --checker 8", 1, "has no texture coordinates"},
+               {ball + " --f-stop 2", 1, "without --f-stop"},
+               {folder.file("none.obj"), 1, "none.obj"},
+               {fog() + " " + ball, 1, "is a mesh, not a density"}};
+  for (const auto& c : cases) {
+    const ProgramResult result =
+        runProgram("render " + c.arguments + " -o " + folder.file("b.exr") + " --quiet --size 8x6");
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
+  }
+}
+
 TEST_F(RenderLayers, ObjectsThatCannotBeAreRefused) {
   const TemporaryFolder folder, files;
   std::ofstream(files.file("bare.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";

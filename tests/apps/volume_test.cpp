@@ -145,9 +145,9 @@ TEST_F(VolumeOptionsOfRender, RefusesListsThatDoNotFitTheVolumes) {
 
 TEST_F(VolumeOptionsOfRender, SendsMeshesToTheVerbThatMakesDensitiesOfThem) {
   const std::string mesh = ownData("data/sphere_uv.obj");
-  for (const std::string verb : {"render", "turntable --frames 1"}) {
-    const ProgramResult result =
-        runProgram(verb + " " + mesh + " --quiet -o " + file(verb == "render" ? "a.exr" : "a.#.exr"));
+  for (const std::string& verb : {"render " + file("whole.vdb"), std::string("turntable --frames 1")}) {
+    const ProgramResult result = runProgram(verb + " " + mesh + " --quiet -o " +
+                                            file(verb.starts_with("render") ? "a.exr" : "a.#.exr"));
     EXPECT_EQ(result.exitCode, 1);
     EXPECT_NE(result.errors.find("is a mesh, not a density; 'nephele cloud " + mesh), std::string::npos)
         << result.errors;

@@ -1,0 +1,47 @@
+#include "apps/options/shapes_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/exr_io.h"
+#include "nephele/render/image/png_io.h"
+#include "nephele/render/preview/surface_picture.h"
+
+namespace nephele::apps {
+
+bool areShapes(const std::vector<std::string>& paths) {
+  return std::ranges::all_of(paths, [](const std::string& path) {
+    if (isMeshFile(path)) return true;
+    for (const VdbGrid& grid : readVdbHeaders(path))
+      if (valuesOf(grid) == VdbValues::scalar) return labelOf(grid).gridClass == VdbGridInfo::Class::levelSet;
+    return false;
+  });
+}
+
+void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
+                        const PictureOptions& options, const PictureFiles& files, Run& run) {
+  run.begin("read");
+  std::vector<SurfaceObject> shapes = objects.shapes(inputs, run.memoryLimitBytes);
+  CameraOptions camera = options;
+  for (const SurfaceObject& shape : shapes)
+    for (const std::uint32_t v : shape.mesh.corners) camera.framed.emplace_back(shape.mesh.positions[v]);
+  SurfacePictureOptions shown;
+  shown.camera = camera.camera(RenderVolume(std::make_shared<const BrickGrid>()));
+  if (shown.camera->hasLens() || shown.camera->isMoving())
+    throw Error("meshes and level sets alone are shown without --f-stop, --lens-radius and --shutter");
+  run.requireMemory(estimateSurfacePictureBytes(shown.camera->width(), shown.camera->height()),
+                    "make the picture smaller (--size)");
+  const Image image = pictureSurfaces(std::move(shapes), shown, run);
+  run.begin("write");
+  writeExr(files.output, image, *shown.camera, run.metadata());
+  if (!files.preview.empty()) writePng(files.preview, image, options.screen, run.metadata());
+  run.result(fmt::format("{}: {}x{}, {} surface{}", files.output, shown.camera->width(),
+                         shown.camera->height(), inputs.size(), inputs.size() == 1 ? "" : "s"));
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/options/object_options.h"
+
+namespace nephele::apps {
+
+/// Whether files hold surfaces only: meshes, or level sets as their first scalar grids. @throws Error naming
+/// the file.
+bool areShapes(const std::vector<std::string>& paths);
+
+/// Files of a picture: linear (.exr), and for the screen (.png) if there is to be one.
+struct PictureFiles {
+  std::string output, preview;
+};
+
+/// Writes a picture of meshes and level sets alone, shaded quickly in a light of their own. The camera, the
+/// view transform and the paint of objects are those of the options.
+/// @throws CLI::Error for a camera that cannot be, Error naming the file.
+void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
+                        const PictureOptions& options, const PictureFiles& files, Run& run);
+
+}  // namespace nephele::apps
