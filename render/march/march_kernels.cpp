@@ -4,10 +4,10 @@
 // T_before - T_after with T = exp(-optical depth so far), so that the weights of a ray add up to its opacity
 // exactly, whatever the steps are.
 //
-// Steps are gathered into blocks of 32 that run across bricks. A block is looked up as vectors: brick table,
-// then the eight corners, in the density, in every sun's column densities and in the scattered light. The
-// first two are CodedBricks, half as many bytes to wait for. Whatever does not have to wait for the densities
-// stands beside what does.
+// Steps are gathered into blocks of 16 that run across bricks. Densities of a block are looked up as vectors:
+// brick table, then the eight corners. So is the light, in every sun's column densities and in the scattered
+// light, of those steps alone that add to the picture, once they fill a vector. Densities and columns are
+// CodedBricks, half as many bytes to wait for.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE
@@ -25,31 +25,40 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
-void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
-                std::size_t count) {
+template <class March>
+HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchResult* results,
+                          MarchRecord* records, std::size_t count, March&& march) {
   for (std::size_t i = 0; i != count; ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
     if (records) records[i].clear();
-    Marcher marcher(scene, rays[i], results[i], records ? records + i : nullptr);
+    const auto one = [&]<int kColours>() HWY_ATTR {
+      Marcher<kColours> marcher(scene, rays[i], results[i], records ? records + i : nullptr);
+      march(marcher, i);
+      marcher.finish();
+    };
+    if (scene.isColoured())
+      one.template operator()<3>();
+    else
+      one.template operator()<1>();
+  }
+}
+
+void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
+                std::size_t count) {
+  marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     detail::forEachRun(scene, rays[i], [&](float s, float ds, int n, float density) {
       return marcher.take(s, ds, n, density);
     });
-    marcher.finish();
-  }
+  });
 }
 
 void marchStepsBatch(const MarchScene& scene, const MarchRay* rays, const std::span<const MarchStep>* steps,
                      MarchResult* results, MarchRecord* records, std::size_t count) {
-  for (std::size_t i = 0; i != count; ++i) {
-    results[i] = {};
-    results[i].distance = std::numeric_limits<float>::infinity();
-    if (records) records[i].clear();
-    Marcher marcher(scene, rays[i], results[i], records ? records + i : nullptr);
+  marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     for (const MarchStep& step : steps[i])
       if (!marcher.take(step)) break;
-    marcher.finish();
-  }
+  });
 }
 
 }  // namespace nephele::HWY_NAMESPACE

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "nephele/render/volume/brick_walk.h"
 
@@ -14,64 +16,120 @@ inline float stepGrowth(const MarchScene& scene, float depth) {
   return std::min(1 + x + 0.5f * x * x, scene.mostGrowth);
 }
 
+/// Optical depth behind which less than the cutoff is seen of any colour.
+inline float opaqueDepth(const MarchScene& scene) {
+  return -std::log(scene.cutoff) / scene.leastColour();
+}
+
 /// Cuts the occupied part of a ray into runs of equal steps: calls take(s, ds, count, density), where steps
-/// start at s, s + ds ..., and stops when it returns false. `density` is negative where it has to be looked
-/// up.
+/// start at s, s + ds ..., and stops when it returns false, or where the ranges of the bricks in front
+/// promise that nothing is left to see. `density` is negative where it has to be looked up.
 ///
 /// Runs go on from brick to brick where bricks touch, so that their borders leave no trace, and start anew
 /// behind a gap. Steps grow with the optical depth that the ranges of the bricks in front promise.
 template <class Take>
-[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take) {
+class Runs {
+ public:
+  Runs(const MarchScene& scene, const MarchRay& ray, Take& take)
+      : scene_(scene), ray_(ray), take_(take), opaque_(opaqueDepth(scene)) {}
+
+  /// The part of a brick of the pool from s0 to s1. False once there is no need to go on.
+  [[gnu::always_inline]] bool add(float s0, float s1, std::int32_t pool) {
+    const Interval& range = scene_.ranges[pool];
+    const bool isUniform = range.max - range.min < 0.01f * range.max;
+    if (s0 >= farther_) widen(s0);
+    const float wide = isUniform ? widestUniform_ : widest_;
+    const float thickest = scene_.extinction * range.max;
+    const float least =
+        std::max(thickest * wide > scene_.stepDepth ? scene_.stepDepth / thickest : wide, scene_.leastStep);
+    if (isUniform) return addUniform(s0, s1, range, least);
+    // Where the density varies it must still be met at every voxel.
+    const float ds = std::min(least * growth_, std::max(least, scene_.step));
+    if (s0 > end_ || ds != ds_ || density_ >= 0) {
+      if (!close()) return false;
+      open(s0, ds, 1.0f / ds, -1.0f);
+    }
+    end_ = s1;
+    if (range.min > 0) promise(scene_.extinction * range.min * (s1 - std::max(s0, start_)));
+    return (end_ - start_) * perStep_ < kMany || close();
+  }
+
+  bool close() {
+    if (!(start_ < end_)) return true;
+    float ds = ds_;
+    const int count = int(std::ceil((end_ - start_) * perStep_));
+    if (ray_.isCut && end_ >= ray_.length) ds = (end_ - start_) / float(count);
+    const float start = std::exchange(start_, start_ + float(count) * ds);
+    end_ = start_;
+    return take_(start, ds, count, density_) && depth_ < opaque_;
+  }
+
+ private:
   // Enough steps to be worth a call.
-  constexpr int kMany = 64;
-  struct Run {
-    float start = 0.0f, ds = 0.0f, perStep = 0.0f, density = -1.0f, end = 0.0f;
-    int count = 0;
-  } run;
-  float cursor = 0.0f, depth = 0.0f, growth = 1.0f;
+  static constexpr float kMany = 64;
+
+  // From `s`, or where the last step before it ends.
+  void open(float s, float ds, float perStep, float density) {
+    start_ = std::max(start_, s);
+    ds_ = ds, perStep_ = perStep, density_ = density;
+  }
+
+  // Steps as wide as pixels are, and by a tenth wider in turn, so that runs are long.
+  void widen(float s) {
+    const float pixel = scene_.pixelAngle * (ray_.start + s);
+    widest_ = std::max(scene_.step, std::min(4.0f * scene_.step, pixel));
+    widestUniform_ = std::max(scene_.uniformStep, widest_);
+    farther_ = pixel > 0 ? std::max(1.1f * pixel, scene_.step) / scene_.pixelAngle - ray_.start : INFINITY;
+  }
+
+  void promise(float depth) {
+    depth_ += depth;
+    growth_ = stepGrowth(scene_, depth_);
+  }
+
+  // Steps may be longer than voxels, of lengths that grow.
+  bool addUniform(float s0, float s1, const Interval& range, float least) {
+    if (!close()) return false;
+    const float thinnest = scene_.extinction * std::max(range.min, 0.0f),
+                density = range.isPoint() ? range.max : -1.0f;
+    for (float cursor = std::max(start_, s0); cursor < s1;) {
+      float ds = least * growth_;
+      // As far as the growth is about the same.
+      const float end =
+          thinnest * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest, ds)) : s1;
+      const int count = int(std::ceil((end - cursor) / ds));
+      // The last of them must not reach into a brick that differs.
+      if (end == s1) ds = (s1 - cursor) / float(count);
+      const float start = std::exchange(cursor, cursor + float(count) * ds);
+      promise(thinnest * (std::min(cursor, s1) - start));
+      start_ = end_ = cursor;
+      if (!take_(start, ds, count, density) || !(depth_ < opaque_)) return false;
+    }
+    return true;
+  }
+
+  const MarchScene& scene_;
+  const MarchRay& ray_;
+  Take& take_;
+  const float opaque_;
+  // The run so far: where it began and how far it has to go.
+  float start_ = 0.0f, end_ = 0.0f, ds_ = 0.0f, perStep_ = 0.0f, density_ = -1.0f;
+  // Of steps from here to `farther_`.
+  float widest_ = 0.0f, widestUniform_ = 0.0f, farther_ = 0.0f;
+  // At least so much lies in front.
+  float depth_ = 0.0f, growth_ = 1.0f;
+};
+
+template <class Take>
+[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take) {
+  Runs runs(scene, ray, take);
   bool goesOn = true;
   walkBricks(
       scene, ray.density,
       ray.length, [&](float s0, float s1, std::int32_t pool) __attribute__((always_inline)) {
-        cursor = std::max(cursor, s0);
-        if (!(cursor < s1)) return true;
-        const Interval& range = scene.ranges[pool];
-        const bool uniform = range.max - range.min < 0.01f * range.max;
-        const float usual = uniform ? scene.uniformStep : scene.step;
-        const float wide = std::max(usual, std::min(4.0f * scene.step, scene.pixelAngle * (ray.start + s0)));
-        const float thickest = scene.extinction * range.max,
-                    thinnest = scene.extinction * std::max(range.min, 0.0f);
-        const float least =
-            std::max(thickest * wide > scene.stepDepth ? scene.stepDepth / thickest : wide, scene.leastStep);
-        while (cursor < s1) {
-          // Where the density varies it must still be met at every voxel.
-          float ds = uniform ? least * growth : std::min(least * growth, std::max(least, scene.step));
-          // As far as the growth is about the same.
-          const float end =
-              thinnest * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest, ds)) : s1;
-          const float perStep = ds == run.ds ? run.perStep : 1.0f / ds;
-          const int count = int(std::ceil((end - cursor) * perStep));
-          // The last of steps longer than a voxel must not reach into a brick that differs.
-          if (end == s1 && (uniform || (ray.isCut && s1 >= ray.length))) ds = (s1 - cursor) / float(count);
-          const float start = cursor, density = range.isPoint() ? range.max : -1.0f;
-          cursor += float(count) * ds;
-          if (thinnest > 0) {
-            depth += thinnest * (std::min(cursor, s1) - start);
-            growth = stepGrowth(scene, depth);
-          }
-          if (run.count > 0 && run.count < kMany && start == run.end && ds == run.ds &&
-              density == run.density) {
-            run.count += count;
-          } else {
-            if (run.count > 0 && !take(run.start, run.ds, run.count, run.density)) return goesOn = false;
-            run = {start, ds, perStep, density, cursor, count};
-            continue;
-          }
-          run.end = cursor;
-        }
-        return true;
+        return goesOn = !(s0 < s1) || runs.add(s0, s1, pool);
       });
-  if (goesOn && run.count > 0) take(run.start, run.ds, run.count, run.density);
+  if (goesOn) runs.close();
 }
 
 }  // namespace nephele::detail

@@ -11,7 +11,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
+#include "nephele/render/march/detail/lit_steps.h"
 #include "nephele/render/march/detail/local_light.h"
 #include "nephele/render/march/detail/march_samples.h"
 #include "nephele/render/march/march_kernels.h"
@@ -20,10 +22,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
-// Two vectors of the widest kind: while one waits for memory, the processor works on the other.
-constexpr int kBlock = 32;
+// Few enough that a ray ends soon behind what hides the rest.
+constexpr int kBlock = 16;
 
-// One ray's march: collects steps, and adds a block of them at a time.
+// One ray's march: collects steps, adds the opacity of a block of them at a time, and the light of a vector
+// of those that are seen. Three colours where MarchScene::isColoured, else one.
+template <int kColours>
 class Marcher {
  public:
   Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result, MarchRecord* record)
@@ -32,7 +36,9 @@ class Marcher {
         result_(result),
         record_(record),
         isHeld_(!ray.holdout.empty()),
-        needsBegin_(isHeld_ || record) {}
+        needsBegin_(isHeld_ || record) {
+    std::fill_n(through_, kColours, 1.0f);
+  }
 
   // `count` steps of length `ds` from `start` on, of this density if it is not negative. False once the ray
   // is as good as opaque.
@@ -78,90 +84,68 @@ class Marcher {
 
   void finish() {
     if (count_ > 0) flush();
+    lightAll();
     result_.opticalDepth = depth_;
     if (record_) mark();
   }
 
  private:
-  template <int kColours>
-  struct Weights {
-    alignas(64) float of[kColours][kBlock];
-  };
-
   // Adds the steps collected. False once the ray is as good as opaque.
-  bool flush() { return count_ > kBlock / 2 ? flushFirst<kBlock>() : flushFirst<kBlock / 2>(); }
-
-  // Those among the first kSize of the block, where all are.
-  template <int kSize>
-  bool flushFirst() {
+  bool flush() {
     const Lanes d;
-    const std::size_t lanes = hn::Lanes(d);
     const int used = count_;
-    for (int i = used; i != kSize; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f, known_[i] = known_[used - 1];
+    for (int i = used; i < kBlock; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f, known_[i] = known_[used - 1];
     count_ = 0;
-    const bool someKnown = someKnown_;
-    someKnown_ = false;
     result_.samples += std::uint32_t(used);
 
-    // The first sun's light is read here, beside the densities, which have to be waited for.
-    alignas(64) float depth[kSize], column[kSize];
-    const bool hasSun = !scene_.suns.empty();
-    Places places[kSize / kLanes], sunPlaces[kSize / kLanes];
-    if (!someKnown) locateBlock<kSize>(scene_.density, ray_.density, s_, places);
-    if (hasSun) locateBlock<kSize>(scene_.suns[0], ray_.suns[0], s_, sunPlaces);
-    if (!someKnown) {
-      readBlock<kSize>(scene_.density, places, depth);
-    } else {
-      for (std::size_t i = 0; i < kSize; i += lanes) {
-        Floats density = hn::Load(d, known_ + i);
-        if (!hn::AllTrue(d, hn::Ge(density, hn::Zero(d)))) {
-          locate<CodedBricks::kWidth>(scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i)), places[0]);
-          density = readCoded(scene_.density, places[0]);
-        }
-        hn::Store(density, d, depth + i);
-      }
-    }
-    if (!scene_.emission.table) {
-      Floats most = hn::Zero(d);
-      for (std::size_t i = 0; i < kSize; i += lanes) most = hn::Max(most, hn::Load(d, depth + i));
-      if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
-    }
-    if (hasSun) readBlock<kSize>(scene_.suns[0], sunPlaces, column);
-    const Floats extinction = hn::Set(d, scene_.extinction);
-    for (std::size_t i = 0; i < kSize; i += lanes)
-      hn::Store(hn::Mul(hn::Mul(hn::Load(d, depth + i), extinction), hn::Load(d, ds_ + i)), d, depth + i);
-    alignas(64) float after[kBlock];
-    const float start = depth_;
+    // Optical depths of the steps, and behind them.
+    alignas(64) float own[kBlock], after[kBlock];
+    readDensities(own);
+    Floats most = hn::Zero(d);
+    for (int i = 0; i != kBlock; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
+    if (!scene_.emission.table && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
+    const float before = depth_;
     Floats behind = hn::Set(d, depth_);
-    for (std::size_t i = 0; i < kSize; i += lanes) {
-      const Floats sums = runningSum(hn::Load(d, depth + i), behind);
+    for (int i = 0; i != kBlock; i += kLanes) {
+      const Floats depth =
+          hn::Mul(hn::Mul(hn::Load(d, own + i), hn::Set(d, scene_.extinction)), hn::Load(d, ds_ + i));
+      const Floats sums = runningSum(depth, behind);
       behind = broadcastLast(sums);
+      hn::Store(depth, d, own + i);
       hn::Store(sums, d, after + i);
     }
     depth_ = hn::GetLane(behind);
-    if (!isHeld_ && start <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
+    if (!isHeld_ && before <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
       int first = 0;
       while (after[first] <= detail::kVisibleDepth) ++first;
       result_.distance = ray_.start + s_[first];
     }
+    if (isHeld_) hold(before, after, used);
+    if (record_) record(before, after, used);
 
-    if (isHeld_) hold(start, after, used);
-    if (record_) record(start, after, used);
-    if (scene_.isColoured()) return flushColours<kSize>(depth, after, column);
-
-    Weights<1> weights;
-    Floats through = hn::Set(d, through_);
-    for (std::size_t i = 0; i < kSize; i += lanes) {
-      const Floats tau = hn::Min(hn::Load(d, after + i), hn::Set(d, 80.0f));
-      const Floats left = expOfMinus(tau);
-      Floats weight = hn::Sub(movedUp(left, through), left);
-      if (isHeld_) weight = hn::Mul(weight, hn::Load(d, seen_ + i));
-      hn::Store(weight, d, weights.of[0] + i);
-      through = broadcastLast(left);
+    for (int i = 0; i != kBlock; i += kLanes) {
+      LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
+      weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
+            steps);
+      lit_.add(steps);
+      if (lit_.full()) light(lit_.take());
     }
-    through_ = hn::GetLane(through);
-    light<kSize>(weights, column);
-    return through_ > scene_.cutoff;
+    return *std::max_element(through_, through_ + kColours) > scene_.cutoff;
+  }
+
+  void readDensities(float* density) {
+    const Lanes d;
+    if (!std::exchange(someKnown_, false))
+      return sampleBlock<kBlock>(scene_.density, ray_.density, s_, density);
+    for (int i = 0; i != kBlock; i += kLanes) {
+      Floats known = hn::Load(d, known_ + i);
+      if (!hn::AllTrue(d, hn::Ge(known, hn::Zero(d)))) {
+        Places places;
+        locate<CodedBricks::kWidth>(scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i)), places);
+        known = readCoded(scene_.density, places);
+      }
+      hn::Store(known, d, density + i);
+    }
   }
 
   // What the holdout leaves of every step, and of its opacity.
@@ -186,7 +170,16 @@ class Marcher {
     return opacity[0] + opacity[1] + opacity[2] > 3 * detail::kVisibleOpacity;
   }
 
-  void mark() { record_->marks.push_back({record_->steps.size(), result_}); }
+  // The result so far, with the light that is waited for: what is added to it later stays as without a
+  // record.
+  void mark() {
+    const MarchResult before = result_;
+    const LitSteps<kColours> waiting = lit_;
+    lightAll();
+    record_->marks.push_back({record_->steps.size(), result_});
+    result_ = before;
+    lit_ = waiting;
+  }
 
   // The steps of a block, before its light is added.
   void record(float before, const float* after, int used) {
@@ -201,125 +194,108 @@ class Marcher {
     }
   }
 
-  // The same where colours differ in more than their albedo: `after` are optical depths behind the steps,
-  // `depth` their own.
-  template <int kSize>
-  bool flushColours(const float* depth, const float* after, const float* column) {
+  // What steps weigh in the picture, by their own optical depths and those behind them: the transmittance
+  // that each takes away. Adds what glows in them.
+  HWY_INLINE void weigh(Floats own, Floats after, Floats seen, LitPart<kColours>& steps) {
     const Lanes d;
-    const std::size_t lanes = hn::Lanes(d);
-    alignas(64) float through[3][kBlock + 1];
-    for (int c = 0; c != 3; ++c) {
-      through[c][0] = throughColours_[c];
-      const Floats share = hn::Set(d, scene_.extinctionColour[c]);
-      for (std::size_t i = 0; i < kSize; i += lanes) {
-        const Floats tau = hn::Min(hn::Mul(hn::Load(d, after + i), share), hn::Set(d, 80.0f));
-        hn::StoreU(expOfMinus(tau), d, through[c] + 1 + i);
-      }
-      throughColours_[c] = through[c][kSize];
+    Floats before[kColours];
+    for (int c = 0; c != kColours; ++c) {
+      const Floats depth = kColours == 1 ? after : hn::Mul(after, hn::Set(d, scene_.extinctionColour[c]));
+      const Floats left = expOfMinus(hn::Min(depth, hn::Set(d, 80.0f)));
+      before[c] = movedUp(left, hn::Set(d, through_[c]));
+      steps.weight[c] = hn::Sub(before[c], left);
+      through_[c] = hn::GetLane(broadcastLast(left));
     }
-    Weights<3> weights;
-    for (std::size_t i = 0; i < kSize; i += lanes) {
-      const Floats s = hn::Load(d, s_ + i), own = hn::Load(d, depth + i);
-      Floats weight[3];
-      for (int c = 0; c != 3; ++c)
-        weight[c] = hn::Sub(hn::LoadU(d, through[c] + i), hn::LoadU(d, through[c] + i + 1));
-      const Floats seen = isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f);
-      if (scene_.emission.table) {
-        // T (1 - exp(-t)) / t, by its series where the difference would lose its digits.
-        Floats glow[3];
-        sampleColour(scene_.emission, pointAt(ray_.density, s), glow);
-        const Floats step =
-            hn::Mul(hn::Load(d, ds_ + i), hn::Set(d, scene_.extinction * scene_.emissionScale));
-        for (int c = 0; c != 3; ++c) {
-          const Floats t = hn::Mul(own, hn::Set(d, scene_.extinctionColour[c]));
-          const Floats thin =
-              hn::NegMulAdd(t, hn::NegMulAdd(t, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
-          const Floats mean =
-              hn::IfThenElse(hn::Lt(t, hn::Set(d, 0.03f)), hn::Mul(hn::LoadU(d, through[c] + i), thin),
-                             hn::Div(weight[c], hn::Max(t, hn::Set(d, 0.03f))));
-          result_.emission[c] +=
-              hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(glow[c], step), hn::Mul(mean, seen))));
-        }
-      }
-      if (scene_.colour.table) {
-        const Floats density = hn::Div(
-            own, hn::Max(hn::Mul(hn::Load(d, ds_ + i), hn::Set(d, scene_.extinction)), hn::Set(d, 1e-30f)));
-        const auto some = hn::Gt(density, hn::Set(d, 1e-30f));
-        Floats colour[3];
-        sampleColour(scene_.colour, pointAt(ray_.density, s), colour);
-        for (int c = 0; c != 3; ++c)
-          weight[c] = hn::Mul(weight[c], hn::IfThenElseZero(some, hn::Div(colour[c], density)));
-      }
-      for (int c = 0; c != 3; ++c) hn::Store(hn::Mul(weight[c], seen), d, weights.of[c] + i);
+    if constexpr (kColours == 3) {
+      if (scene_.emission.table) glow(own, before, seen, steps);
+      if (scene_.colour.table) colour(own, steps);
     }
-    light<kSize>(weights, column);
-    return std::max({throughColours_[0], throughColours_[1], throughColours_[2]}) > scene_.cutoff;
+    if (isHeld_)
+      for (Floats& weight : steps.weight) weight = hn::Mul(weight, seen);
   }
 
-  // Adds the light that steps of one weight, or of one for each colour, send to the eye.
-  template <int kSize, int kColours>
-  void light(const Weights<kColours>& weights, const float* firstColumn) {
+  // T (1 - exp(-t)) / t, by its series where the difference would lose its digits.
+  void glow(Floats own, const Floats (&before)[kColours], Floats seen, const LitPart<kColours>& steps) {
+    const Lanes d;
+    Floats glow[3];
+    sampleColour(scene_.emission, pointAt(ray_.density, steps.s), glow);
+    const Floats step = hn::Mul(steps.length, hn::Set(d, scene_.extinction * scene_.emissionScale));
+    for (int c = 0; c != 3; ++c) {
+      const Floats t = hn::Mul(own, hn::Set(d, scene_.extinctionColour[c]));
+      const Floats thin =
+          hn::NegMulAdd(t, hn::NegMulAdd(t, hn::Set(d, 1.0f / 6), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
+      const Floats mean = hn::IfThenElse(hn::Lt(t, hn::Set(d, 0.03f)), hn::Mul(before[c], thin),
+                                         hn::Div(steps.weight[c], hn::Max(t, hn::Set(d, 0.03f))));
+      result_.emission[c] +=
+          hn::GetLane(hn::SumOfLanes(d, hn::Mul(hn::Mul(glow[c], step), hn::Mul(mean, seen))));
+    }
+  }
+
+  void colour(Floats own, LitPart<kColours>& steps) {
+    const Lanes d;
+    const Floats density =
+        hn::Div(own, hn::Max(hn::Mul(steps.length, hn::Set(d, scene_.extinction)), hn::Set(d, 1e-30f)));
+    const auto some = hn::Gt(density, hn::Set(d, 1e-30f));
+    Floats colour[3];
+    sampleColour(scene_.colour, pointAt(ray_.density, steps.s), colour);
+    for (int c = 0; c != 3; ++c)
+      steps.weight[c] = hn::Mul(steps.weight[c], hn::IfThenElseZero(some, hn::Div(colour[c], density)));
+  }
+
+  // Of all that wait for it.
+  void lightAll() {
+    if (!lit_.empty()) light(lit_.take());
+  }
+
+  // Adds the light that steps send to the eye.
+  void light(const LitPart<kColours>& steps) {
     const Lanes d;
     for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-      alignas(64) float other[kSize];
-      if (sun > 0) sampleBlock<kSize>(scene_.suns[sun], ray_.suns[sun], s_, other);
-      const float* column = sun > 0 ? other : firstColumn;
-      for (int n = 0; n != scene_.octaves; ++n)
+      Places places;
+      locate<CodedBricks::kWidth>(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places);
+      const Floats column = readCoded(scene_.suns[sun], places);
+      // Of every colour of the result, and one where a weight is all colours'.
+      const int colours = kColours == 1 ? scene_.colours : kColours;
+      Floats sums[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+      for (int n = 0; n != scene_.octaves; ++n) {
+        Floats lit[kColours];
         for (int c = 0; c != kColours; ++c) {
           const float share = scene_.extinction * scene_.attenuation[n] *
                               (kColours == 1 ? 1.0f : scene_.extinctionColour[c]) *
                               scene_.suns[sun].shadow[c];
-          Floats sum = hn::Zero(d);
-          for (int i = 0; i != kSize; i += kLanes) {
-            const Floats left =
-                hn::Min(hn::Mul(hn::Load(d, column + i), hn::Set(d, share)), hn::Set(d, 80.0f));
-            sum = hn::MulAdd(expOfMinus(left), hn::Load(d, weights.of[c] + i), sum);
-          }
-          const float all = hn::GetLane(hn::SumOfLanes(d, sum));
-          if constexpr (kColours == 1)
-            for (int k = 0; k != scene_.colours; ++k) result_.suns[sun][k] += all * ray_.weight[sun][k][n];
-          else
-            result_.suns[sun][c] += all * ray_.weight[sun][c][n];
+          lit[c] = expOfMinus(hn::Min(hn::Mul(column, hn::Set(d, share)), hn::Set(d, 80.0f)));
         }
-    }
-    if (scene_.locals.empty() && scene_.scattered.empty() && (kColours == 1 || !scene_.glow[0])) return;
-    for (int i = 0; i != kSize; i += kLanes) {
-      const Floats s = hn::Load(d, s_ + i), ds = hn::Load(d, ds_ + i);
-      Floats weight[kColours];
-      for (int c = 0; c != kColours; ++c) weight[c] = hn::Load(d, weights.of[c] + i);
-      for (std::size_t n = 0; n != scene_.locals.size(); ++n)
-        addLocal(scene_, ray_, n, jitter_, s, ds, weight, result_);
-      if (!scene_.scattered.empty()) scattered(s, weight);
-      if constexpr (kColours == 3)
-        if (scene_.glow[0]) scatteredGlow(s, weight);
-    }
-  }
-
-  void scatteredGlow(Floats s, const Floats (&weight)[3]) {
-    const Lanes d;
-    Cells cells;
-    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, s), scene_.scatteredSize), cells);
-    for (int c = 0; c != 3; ++c) {
-      const Floats there = read(scene_.glow[c], cells);
-      result_.emission[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[c])));
-    }
-  }
-
-  template <int kColours>
-  void scattered(Floats s, const Floats (&weight)[kColours]) {
-    const Lanes d;
-    Cells cells;
-    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, s), scene_.scatteredSize), cells);
-    std::size_t lattice = 0;
-    for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
-      float* result = light < scene_.lightCount() ? result_.suns[light] : result_.sky;
-      for (int c = 0; c != scene_.colours; ++c) {
-        const float* values = scene_.scattered[lattice++];
-        if (!values) continue;
-        const Floats there = read(values, cells);
-        result[c] += hn::GetLane(hn::SumOfLanes(d, hn::Mul(there, weight[kColours == 1 ? 0 : c])));
+        for (int c = 0; c != colours; ++c)
+          sums[c] = hn::MulAdd(lit[kColours == 1 ? 0 : c], hn::Set(d, ray_.weight[sun][c][n]), sums[c]);
       }
+      for (int c = 0; c != colours; ++c)
+        result_.suns[sun][c] +=
+            hn::GetLane(hn::SumOfLanes(d, hn::Mul(sums[c], steps.weight[kColours == 1 ? 0 : c])));
     }
+    for (std::size_t n = 0; n != scene_.locals.size(); ++n)
+      addLocal(scene_, ray_, n, jitter_, steps.s, steps.length, steps.weight, result_);
+    if (scene_.scattered.empty() && (kColours == 1 || !scene_.glow[0])) return;
+    scattered(steps);
+  }
+
+  // The part of it that the lattices hold.
+  void scattered(const LitPart<kColours>& steps) {
+    const Lanes d;
+    Cells cells;
+    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells);
+    const auto add = [&](const float* values, int c, float& to) HWY_ATTR {
+      const Floats weight = steps.weight[kColours == 1 ? 0 : c];
+      to += hn::GetLane(hn::SumOfLanes(d, hn::Mul(read(values, cells), weight)));
+    };
+    std::size_t lattice = 0;
+    if (!scene_.scattered.empty())
+      for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
+        float* result = light < scene_.lightCount() ? result_.suns[light] : result_.sky;
+        for (int c = 0; c != scene_.colours; ++c)
+          if (const float* values = scene_.scattered[lattice++]) add(values, c, result[c]);
+      }
+    if constexpr (kColours == 3)
+      for (int c = 0; c != 3 && scene_.glow[0]; ++c) add(scene_.glow[c], c, result_.emission[c]);
   }
 
   const MarchScene& scene_;
@@ -342,8 +318,9 @@ class Marcher {
   alignas(64) float known_[2 * kBlock];
   int count_ = 0;
   float depth_ = 0.0f;
-  float through_ = 1.0f;
-  float throughColours_[3] = {1.0f, 1.0f, 1.0f};
+  // What is left of light from behind, per colour.
+  float through_[kColours];
+  LitSteps<kColours> lit_;
 };
 
 }  // namespace nephele::HWY_NAMESPACE
