@@ -96,7 +96,8 @@ ForwardLight::ForwardLight(const Phase& phase)
 ForwardLight::ForwardLight(const Phase& phase, const std::vector<float>& moments, float albedo, int degree,
                            int count)
     : ForwardLight(phase) {
-  require(count >= 1 && count <= 16, fmt::format("forward light: expected 1 to 16 terms, got {}", count));
+  require(count >= 1 && count <= kMost,
+          fmt::format("forward light: expected 1 to {} terms, got {}", kMost, count));
   const double f = double(fAbove(moments, degree));
   if (count == 1 || f < 1e-4) return;
   // Values of q, closer towards the ends.
@@ -128,11 +129,18 @@ ForwardLight::ForwardLight(const Phase& phase, const std::vector<float>& moments
   }
 }
 
-float ForwardLight::weight(int n, float cosine) const {
+void ForwardLight::weights(float cosine, float* found) const {
   const float place = float(kNodes) * std::sqrt(std::clamp(0.5f * (1 - cosine), 0.0f, 1.0f));
   const int node = std::min(int(place), kNodes - 1);
-  const float* at = table_.data() + n * (kNodes + 1) + node;
-  return (n == 0 ? phase_(cosine) : 0.0f) + at[0] + (place - float(node)) * (at[1] - at[0]);
+  const float* at = table_.data() + node;
+  for (int n = 0; n != count(); ++n, at += kNodes + 1)
+    found[n] = (n == 0 ? phase_(cosine) : 0.0f) + at[0] + (place - float(node)) * (at[1] - at[0]);
+}
+
+float ForwardLight::weight(int n, float cosine) const {
+  float found[kMost];
+  weights(cosine, found);
+  return found[n];
 }
 
 double ForwardLight::exact(const std::vector<float>& moments, float albedo, int degree, float depth,

@@ -38,6 +38,8 @@ struct SmoothScattering {
 /// F = sum over n of weight(n, c) exp(-tau attenuation(n)). The first is the unscattered beam.
 class ForwardLight {
  public:
+  static constexpr int kMost = 16;
+
   /// Light scattered once, by `phase`: what a count of 1 gives.
   explicit ForwardLight(const Phase& phase = {});
   /// @throws Error unless 1 <= count <= 16.
@@ -46,6 +48,8 @@ class ForwardLight {
   int count() const { return int(attenuations_.size()); }
   float attenuation(int n) const { return attenuations_[std::size_t(n)]; }
   float weight(int n, float cosine) const;
+  /// All `count` of them, at most kMost.
+  void weights(float cosine, float* found) const;
   /// The sum itself, term by term. Slow; for tests.
   static double exact(const std::vector<float>& moments, float albedo, int degree, float depth, float cosine);
 

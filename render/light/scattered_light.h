@@ -98,9 +98,11 @@ class ScatteredLight {
   float meanAt(const Vec3f& world) const;
 
   /// What every node sends towards a viewpoint, per optical depth of the medium itself, of all light but the
-  /// beam (ForwardLight has what becomes of that) and what glows. Cost: a march of some ten steps per node.
-  /// Uses all cores.
+  /// beam (ForwardLight has what becomes of that) and what glows. Cost: a march of some ten steps per node,
+  /// on all cores; little more of several lights than of one.
   std::vector<float> towards(const Viewpoint& viewpoint) const;
+  static std::vector<std::vector<float>> towards(std::span<const ScatteredLight* const> lights,
+                                                 const Viewpoint& viewpoint);
 
   /// Over the finest lattice, and an estimate of the relative error that they left.
   int sweeps() const { return sweeps_; }
@@ -119,6 +121,7 @@ class ScatteredLight {
   static Bytes estimateBytes(const RenderVolume& volume, const Options& options);
 
  private:
+  struct Sender;
   void addBeam(detail::UnsetVector<float>& moments, const detail::ScatteringLattice& lattice,
                const detail::CellRows& rows, float wider) const;
   Vec3f wayOfBeam(const Vec3f& node) const;

@@ -7,12 +7,12 @@
 // added.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
-#include "nephele/render/light/detail/lattice_point.h"
-#include "nephele/render/light/exp_of_minus.h"
+#include "nephele/render/light/detail/lines_of_sight.h"
 #include "nephele/render/light/scattered_light.h"
 
 namespace nephele {
@@ -20,43 +20,56 @@ namespace nephele {
 namespace {
 
 // Light that this share of what a node sends is behind is not looked for, nor is it behind a tenth of L.
-// Steps grow this often, after so many of them.
 constexpr float kCutoff = 1e-2f, kLargestCutoff = 0.1f;
-constexpr int kStepsOfALength = 4, kLongestStep = 4;
-
-// What light meets at a place.
-struct Met {
-  float density, source;
-
-  Met operator+(const Met& b) const { return {density + b.density, source + b.source}; }
-  Met operator-(const Met& b) const { return {density - b.density, source - b.source}; }
-  Met operator*(float x) const { return {density * x, source * x}; }
-};
-
-// Light that goes along a line, near to far: sources are linear in depth between two places.
-struct LineOfSight {
-  Met met;
-  float sum = 0, through = 1;
-
-  void step(float length, float depthPerDensity, Met next) {
-    // Far from density nothing is known of the source.
-    if (!(next.density > 0)) next.source = met.source;
-    const float depth = std::min(0.5f * length * depthPerDensity * (met.density + next.density), 80.0f),
-                left = detail::expOfMinus(depth);
-    const float mean = depth < 0.03f ? 1 - depth * (0.5f - depth * (1.0f / 6)) : (1 - left) / depth;
-    sum += through * (met.source * (1 - mean) + next.source * (mean - left));
-    through *= left;
-    met = next;
-  }
-};
 
 }  // namespace
 
+// Of a light, with the lights that are seen alike.
+struct ScatteredLight::Sender {
+  const ScatteredLight& light;
+
+  bool isSeenAs(const ScatteredLight& other) const;
+  float sky(const Vec3f& way) const;
+  template <class Away, class Tell>
+  std::vector<float> sources(const Away& away, const Tell& tell) const;
+  static void send(std::span<const ScatteredLight* const> lights, const Viewpoint& viewpoint,
+                   std::span<std::vector<float>* const> sent);
+};
+
+// Whether the same is between its nodes and an eye as for another.
+bool ScatteredLight::Sender::isSeenAs(const ScatteredLight& other) const {
+  return light.size_ == other.size_ && light.share_ == other.share_ &&
+         light.depthPerDensity_ == other.depthPerDensity_ && light.density_ == other.density_;
+}
+
+std::vector<std::vector<float>> ScatteredLight::towards(std::span<const ScatteredLight* const> lights,
+                                                        const Viewpoint& viewpoint) {
+  std::vector<std::vector<float>> sent(lights.size());
+  for (std::size_t first = 0; first != lights.size(); ++first) {
+    if (!sent[first].empty()) continue;
+    std::vector<const ScatteredLight*> alike;
+    std::vector<std::vector<float>*> theirs;
+    for (std::size_t i = first; i != lights.size() && alike.size() != detail::kLightsTogether; ++i)
+      if (sent[i].empty() && Sender{*lights[i]}.isSeenAs(*lights[first]))
+        alike.push_back(lights[i]), theirs.push_back(&sent[i]);
+    Sender::send(alike, viewpoint, theirs);
+  }
+  return sent;
+}
+
 std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
-  const std::size_t cells = beam_.size();
-  const int degree = int(phase_.size()) - 1;
-  const Vec3f eye = viewpoint.place ? worldToLattice_(*viewpoint.place) : Vec3f{},
-              forward = viewpoint.forward ? normalize(worldToLattice_.linear * *viewpoint.forward) : Vec3f{};
+  const ScatteredLight* const one[] = {this};
+  return std::move(towards(one, viewpoint).front());
+}
+
+// Of lights that are seen alike, as many as go together.
+void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights, const Viewpoint& viewpoint,
+                                  std::span<std::vector<float>* const> sent) {
+  const ScatteredLight& any = *lights.front();
+  const std::size_t cells = any.density_.size();
+  const Vec3f eye = viewpoint.place ? any.worldToLattice_(*viewpoint.place) : Vec3f{},
+              forward =
+                  viewpoint.forward ? normalize(any.worldToLattice_.linear * *viewpoint.forward) : Vec3f{};
   const auto away = [&](const Vec3f& node) {
     if (!viewpoint.place) return forward;
     const Vec3f way = node - eye;
@@ -64,56 +77,84 @@ std::vector<float> ScatteredLight::towards(const Viewpoint& viewpoint) const {
     const float far = length(way);
     return far > 0 && std::isfinite(far) ? way * (1 / far) : Vec3f{0, 0, 1};
   };
-  const float ofBeam = share_ < 1 ? (1 - smoothShare_) / (1 - share_) : 0.0f;
   // What L is made of, and without the beam.
-  std::vector<Met> met(cells);
-  std::vector<float> own(cells);
+  std::vector<detail::Met> met(cells);
+  std::vector<std::vector<float>> own;
+  for (std::size_t k = 0; k != lights.size(); ++k)
+    own.push_back(Sender{*lights[k]}.sources(away, [&](std::size_t i, float all) {
+      met[i].values[0] = any.density_[i];
+      met[i].values[1 + k] = all;
+    }));
+  for (std::vector<float>* values : sent) values->resize(cells);
+  const detail::SightLattice lattice{any.size_, met.data(), any.depthPerDensity_,
+                                     std::min(kCutoff / std::max(1 - any.share_, kCutoff), kLargestCutoff)};
+  any.rows_->forEachRow([&](int y, int z, const detail::CellRows::Row& row) {
+    detail::LinesOfSight lines;
+    for (int x0 = row.begin; x0 < row.end; x0 += detail::LinesOfSight::kCount) {
+      const int count = std::min(int(row.end) - x0, detail::LinesOfSight::kCount);
+      for (int n = 0; n != count; ++n) {
+        const Vec3f node(Vec3i{x0 + n, y, z}), way = away(node);
+        for (int axis = 0; axis != 3; ++axis)
+          lines.node[axis][n] = node[axis], lines.way[axis][n] = way[axis];
+      }
+      detail::follow(lattice, count, lines);
+      const std::size_t first =
+          (std::size_t(z) * std::size_t(any.size_.y) + std::size_t(y)) * std::size_t(any.size_.x) +
+          std::size_t(x0);
+      for (std::size_t k = 0; k != lights.size(); ++k)
+        for (int n = 0; n != count; ++n) {
+          const Vec3f way{lines.way[0][n], lines.way[1][n], lines.way[2][n]};
+          (*sent[k])[first + std::size_t(n)] =
+              lines.sent[k][n] + lines.through[n] * Sender{*lights[k]}.sky(way);
+        }
+    }
+  });
+  const float share = any.share_;
+  for (std::size_t k = 0; k != lights.size(); ++k) {
+    any.sharpen(own[k]);
+    parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i)
+        (*sent[k])[i] = share * own[k][i] + (1 - share) * (*sent[k])[i];
+    });
+  }
+}
+
+// What comes from the sky behind, along a way from the eye.
+float ScatteredLight::Sender::sky(const Vec3f& way) const {
+  const std::vector<float>& moments = light.sky_;
+  if (moments[0] == 0) return 0;
+  float y[detail::kMostMoments], sum = 0;
+  detail::harmonics(-way, int(light.phase_.size()) - 1, y);
+  for (std::size_t m = 0; m != moments.size(); ++m) sum += moments[m] * y[m];
+  return std::max(sum, 0.0f);
+}
+
+// What nodes send without the beam; calls tell(node, what L is made of there).
+template <class Away, class Tell>
+std::vector<float> ScatteredLight::Sender::sources(const Away& away, const Tell& tell) const {
+  const int degree = int(light.phase_.size()) - 1;
+  const float ofBeam = light.share_ < 1 ? (1 - light.smoothShare_) / (1 - light.share_) : 0.0f;
+  std::vector<float> own(light.beam_.size());
   float beamWay[detail::kMostMoments] = {};
-  if (towards_) detail::harmonics(-*towards_, degree, beamWay);
-  rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f& node) {
+  if (light.towards_) detail::harmonics(-*light.towards_, degree, beamWay);
+  light.rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f& node) {
     float y[detail::kMostMoments], ways[detail::kMostMoments];
     detail::harmonics(-away(node), degree, y);
-    const float *way = beamWay, *moments = moments_.data() + detail::CellRows::momentsAt(kept, sky_.size());
-    if (place_) detail::harmonics(wayOfBeam(node), degree, ways), way = ways;
+    const float *way = beamWay,
+                *moments = light.moments_.data() + detail::CellRows::momentsAt(kept, light.sky_.size());
+    if (light.place_) detail::harmonics(light.wayOfBeam(node), degree, ways), way = ways;
     float all = 0, beam = 0;
     for (int l = 0, m = 0; l <= degree; ++l) {
-      const float weight = albedo_ * phase_[std::size_t(l)];
+      const float weight = light.albedo_ * light.phase_[std::size_t(l)];
       for (; m != detail::momentCount(l); ++m) {
         all += weight * y[m] * moments[m * detail::CellRows::kVector];
-        if (m == 0 || hasWay()) beam += weight * y[m] * (m == 0 ? 1.0f : way[m]);
+        if (m == 0 || light.hasWay()) beam += weight * y[m] * (m == 0 ? 1.0f : way[m]);
       }
     }
-    own[i] = all - beam * beam_[i];
-    met[i] = {density_[i], own[i] + ofBeam * beam * beam_[i]};
+    own[i] = all - beam * light.beam_[i];
+    tell(i, own[i] + ofBeam * beam * light.beam_[i]);
   });
-  std::vector<float> sent(cells);
-  const float cutoff = std::min(kCutoff / std::max(1 - share_, kCutoff), kLargestCutoff);
-  rows_->forEachCell([&](std::size_t i, std::size_t, const Vec3f& node) {
-    const Vec3f way = away(node);
-    LineOfSight line{met[i]};
-    float at = 0;
-    for (int step = 0; line.through > cutoff; ++step) {
-      const float length = float(std::min(1 << step / kStepsOfALength, kLongestStep));
-      at += length;
-      const Vec3f p = node + way * at;
-      if (!(p.x > -1 && p.y > -1 && p.z > -1 && p.x < float(size_.x) && p.y < float(size_.y) &&
-            p.z < float(size_.z)))
-        break;
-      line.step(length, depthPerDensity_, detail::LatticePoint(size_, p).of(met.data()));
-    }
-    float sky = 0;
-    if (sky_[0] != 0) {
-      float y[detail::kMostMoments];
-      detail::harmonics(-way, degree, y);
-      for (std::size_t m = 0; m != sky_.size(); ++m) sky += sky_[m] * y[m];
-    }
-    sent[i] = line.sum + line.through * std::max(sky, 0.0f);
-  });
-  sharpen(own);
-  parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) sent[i] = share_ * own[i] + (1 - share_) * sent[i];
-  });
-  return sent;
+  return own;
 }
 
 // Values are means over cells. Interpolated between nodes they would have the mean (v_before + 6 v +

@@ -1,5 +1,6 @@
 #include "nephele/render/light/view_light.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -8,21 +9,30 @@
 namespace nephele::detail {
 
 ViewLight::ViewLight(const BakedLight& lit, const Viewpoint& viewpoint) {
+  const bool once = lit.octaves.count == 1;
+  std::vector<const ScatteredLight*> lights;
+  for (const auto* list : {&lit.scattered, &lit.glow})
+    for (const std::shared_ptr<const ScatteredLight>& light : *list)
+      if (light && std::ranges::find(lights, light.get()) == lights.end()) lights.push_back(light.get());
+  std::vector<std::vector<float>> sent;
+  if (once)
+    for (const ScatteredLight* light : lights) sent.push_back(light->mean());
+  else
+    sent = ScatteredLight::towards(lights, viewpoint);
   // Colours and lights that are alike share what is made.
   std::map<std::pair<const ScatteredLight*, float>, Values> made;
   const auto valuesOf = [&](const std::shared_ptr<const ScatteredLight>& light, int colour) -> Values {
     if (!light) return nullptr;
-    const bool once = lit.octaves.count == 1;
     const float mean = lit.meanAlbedo[colour], own = lit.medium.albedo[colour],
                 share = once       ? own
                         : mean > 0 ? own / mean
                                    : 0.0f;
     Values& values = made[{light.get(), share}];
     if (!values) {
-      std::vector<float> sent = once ? light->mean() : light->towards(viewpoint);
+      std::vector<float> its = sent[std::size_t(std::ranges::find(lights, light.get()) - lights.begin())];
       if (share != 1)
-        for (float& value : sent) value *= share;
-      values = std::make_shared<const std::vector<float>>(std::move(sent));
+        for (float& value : its) value *= share;
+      values = std::make_shared<const std::vector<float>>(std::move(its));
     }
     return values;
   };

@@ -46,8 +46,9 @@ HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchRe
 
 void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
                 std::size_t count) {
+  const float opaque = detail::opaqueDepth(scene);
   marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
-    detail::forEachRun(scene, rays[i], [&](float s, float ds, int n, float density) {
+    detail::forEachRun(scene, rays[i], opaque, [&](float s, float ds, int n, float density) {
       return marcher.take(s, ds, n, density);
     });
   });

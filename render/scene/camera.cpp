@@ -231,6 +231,7 @@ Ray Camera::rayFrom(const Pose& pose, double x, double y) const {
 }
 
 Ray Camera::ray(double x, double y, double lensU, double lensV, double time) const {
+  if (!isMoving() && pose_.lensRadius == 0) return rayFrom(pose_, x, y);
   const Pose pose = isMoving() ? poseAt(time) : pose_;
   const Ray central = rayFrom(pose, x, y);
   if (pose.lensRadius == 0) return central;

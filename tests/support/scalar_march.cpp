@@ -171,12 +171,13 @@ void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays,
   for (std::size_t i = 0; i != rays.size(); ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
-    detail::forEachRun(scene, rays[i], [&](float start, float ds, int count, float) {
-      for (int n = 0; n != count; ++n)
-        if (!stepScalar(scene, rays[i], start + (float(n) + rays[i].jitter) * ds, ds, results[i]))
-          return false;
-      return true;
-    });
+    detail::forEachRun(
+        scene, rays[i], detail::opaqueDepth(scene), [&](float start, float ds, int count, float) {
+          for (int n = 0; n != count; ++n)
+            if (!stepScalar(scene, rays[i], start + (float(n) + rays[i].jitter) * ds, ds, results[i]))
+              return false;
+          return true;
+        });
   }
 }
 

@@ -24,7 +24,7 @@ struct LatticePoint {
   }
   /// Between the values of the nodes.
   template <class Value>
-  Value of(const Value* values) const {
+  [[gnu::always_inline]] Value of(const Value* values) const {
     const Value* at = values + first;
     const auto edge = [&](std::size_t n) { return at[n] + (at[n + steps[0]] - at[n]) * share.x; };
     const auto face = [&](std::size_t n) { return edge(n) + (edge(n + steps[1]) - edge(n)) * share.y; };

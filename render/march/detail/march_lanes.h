@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "nephele/render/light/exp_of_minus.h"
+#include "nephele/render/light/exp_of_minus_lanes.h"
 #include "nephele/render/volume/lattice_ray.h"
 
 /// Vectors of floats as the march uses them: points along rays, sums along the lanes, exp.
@@ -113,19 +113,8 @@ HWY_INLINE Floats movedUp(Floats x, Floats first) {
   return hn::IfThenElse(hn::FirstN(d, 1), first, reordered(x, order));
 }
 
-// detail::expOfMinus for vectors.
 HWY_INLINE Floats expOfMinus(Floats x) {
-  const Lanes d;
-  const IntLanes i;
-  constexpr auto& kPower = detail::kPowerOfTwo;
-  const Floats y = hn::Mul(x, hn::Set(d, detail::kPerMinusLog2)), middle = hn::Set(d, detail::kRounding);
-  const Floats whole = hn::Add(y, middle), f = hn::Sub(y, hn::Sub(whole, middle)), f2 = hn::Mul(f, f);
-  const auto line = [&](float slope, float at0)
-                        HWY_ATTR { return hn::MulAdd(f, hn::Set(d, slope), hn::Set(d, at0)); };
-  const Floats high = hn::MulAdd(hn::MulAdd(f2, hn::Set(d, kPower[5]), line(kPower[4], kPower[3])), f2,
-                                 line(kPower[2], kPower[1]));
-  const Floats power = hn::MulAdd(high, f2, line(kPower[0], 1.0f));
-  return hn::BitCast(d, hn::Add(hn::BitCast(i, power), hn::ShiftLeft<23>(hn::BitCast(i, whole))));
+  return expOfMinus(Lanes(), x);
 }
 
 }  // namespace nephele::HWY_NAMESPACE

@@ -30,8 +30,8 @@ inline float opaqueDepth(const MarchScene& scene) {
 template <class Take>
 class Runs {
  public:
-  Runs(const MarchScene& scene, const MarchRay& ray, Take& take)
-      : scene_(scene), ray_(ray), take_(take), opaque_(opaqueDepth(scene)) {}
+  Runs(const MarchScene& scene, const MarchRay& ray, float opaque, Take& take)
+      : scene_(scene), ray_(ray), take_(take), opaque_(opaque) {}
 
   /// The part of a brick of the pool from s0 to s1. False once there is no need to go on.
   [[gnu::always_inline]] bool add(float s0, float s1, std::int32_t pool) {
@@ -121,8 +121,9 @@ class Runs {
 };
 
 template <class Take>
-[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, Take&& take) {
-  Runs runs(scene, ray, take);
+[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, float opaque,
+                                              Take&& take) {
+  Runs runs(scene, ray, opaque, take);
   bool goesOn = true;
   walkBricks(
       scene, ray.density,

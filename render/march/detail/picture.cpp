@@ -6,11 +6,16 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/render/light/exp_of_minus.h"
 #include "nephele/render/volume/ray_span.h"
 
 namespace nephele::detail {
 
 namespace {
+
+float opacityOf(float opticalDepth) {
+  return opticalDepth < 1 ? -std::expm1(-opticalDepth) : 1 - expOfMinus(std::min(opticalDepth, 80.0f));
+}
 
 // Rays that are marched through a field together: enough for long blocks of points, few enough for the cache.
 constexpr int kFieldRays = 64;
@@ -129,10 +134,10 @@ bool Picture::prepare(const Ray& ray, const DepthBounds::Range& reach, const Sub
     out.suns[sun] = lit_.toSun[sun].ray(besideEntry, ray.direction);
     // Light travels away from the sun, then back along the ray.
     const float cosine = float(dot(lit_.directions[sun], ray.direction));
-    for (int n = 0; n != scene_.octaves; ++n) {
-      const float weight = lit_.forward.weight(n, cosine);
-      for (int c = 0; c != scene_.colours; ++c) out.weight[sun][c][n] = lit_.medium.albedo[c] * weight;
-    }
+    float weights[MarchScene::kMostOctaves];
+    lit_.forward.weights(cosine, weights);
+    for (int c = 0; c != scene_.colours; ++c)
+      for (int n = 0; n != scene_.octaves; ++n) out.weight[sun][c][n] = lit_.medium.albedo[c] * weights[n];
   }
   for (std::size_t i = 0; i != lit_.toLocal.size(); ++i) {
     MarchRay::Local& local = out.locals[i];
@@ -232,10 +237,9 @@ std::uint64_t Picture::gather(int index, Scratch& scratch) const {
   for (std::size_t i = scratch.begins[std::size_t(index)]; i != scratch.begins[std::size_t(index) + 1]; ++i) {
     const MarchResult& result = scratch.results[i];
     samples += result.samples;
-    Vec3f opacity = Vec3f{1, 1, 1} * -std::expm1(-result.opticalDepth);
+    Vec3f opacity = Vec3f{1, 1, 1} * opacityOf(result.opticalDepth);
     if (scene_.hasExtinctionColour())
-      for (int c = 0; c != 3; ++c)
-        opacity[c] = -std::expm1(-result.opticalDepth * scene_.extinctionColour[c]);
+      for (int c = 0; c != 3; ++c) opacity[c] = opacityOf(result.opticalDepth * scene_.extinctionColour[c]);
     if (!rays[i].holdout.empty())
       opacity = {result.heldOpacity[0], result.heldOpacity[1], result.heldOpacity[2]};
     out.alpha += share * (scene_.hasExtinctionColour() ? (opacity.x + opacity.y + opacity.z) / 3 : opacity.x);
