@@ -93,6 +93,7 @@ Verb wispsVerb();
 Verb meshVerb();
 Verb cutVerb();
 Verb transferVerb();
+Verb transformVerb();
 Verb renderVerb();
 Verb turntableVerb();
 Verb infoVerb();

@@ -282,20 +282,6 @@ void rank(std::vector<Fit>& fits, double tolerance) {
 
 }  // namespace
 
-Vec3d Similarity::turned(const Vec3d& v) const {
-  return {turn[0] * v.x + turn[1] * v.y + turn[2] * v.z, turn[3] * v.x + turn[4] * v.y + turn[5] * v.z,
-          turn[6] * v.x + turn[7] * v.y + turn[8] * v.z};
-}
-
-Vec3d Similarity::turnedBack(const Vec3d& v) const {
-  return {turn[0] * v.x + turn[3] * v.y + turn[6] * v.z, turn[1] * v.x + turn[4] * v.y + turn[7] * v.z,
-          turn[2] * v.x + turn[5] * v.y + turn[8] * v.z};
-}
-
-double Similarity::angle() const {
-  return std::acos(std::clamp(0.5 * (turn[0] + turn[4] + turn[8] - 1), -1.0, 1.0));
-}
-
 AlignmentResult alignSimilarity(const ExactDistance& reference, const ExactDistance& object,
                                 const AlignmentOptions& options, const Progress& progress) {
   require(options.pointCount >= kStartPoints,

@@ -6,24 +6,10 @@
 #include <vector>
 
 #include "nephele/levelset/mesh/exact_distance.h"
+#include "nephele/levelset/mesh/similarity.h"
 #include "nephele/modeling/base/progress.h"
 
 namespace nephele {
-
-/// x -> scale * turn * x + shift, `turn` a rotation matrix, row-major.
-struct Similarity {
-  double scale = 1;
-  std::array<double, 9> turn{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  Vec3d shift;
-
-  Vec3d operator()(const Vec3d& p) const { return turned(p) * scale + shift; }
-  /// A direction, turned only.
-  Vec3d turned(const Vec3d& v) const;
-  /// Turned the other way.
-  Vec3d turnedBack(const Vec3d& v) const;
-  /// Angle of the turn, radians, 0 to pi.
-  double angle() const;
-};
 
 struct AlignmentOptions {
   /// Chooses the surface points.

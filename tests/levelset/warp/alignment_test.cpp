@@ -31,11 +31,6 @@ Similarity similarity(const Vec3f& axis, float degrees, double scale, const Vec3
   return result;
 }
 
-Mesh moved(Mesh mesh, const Similarity& by) {
-  for (Vec3d& p : mesh.positions) p = by(p);
-  return mesh;
-}
-
 /// How far the aligned object is from where it came from, in sizes.
 double error(const Mesh& reference, const Similarity& by) {
   const Mesh object = moved(reference, by);

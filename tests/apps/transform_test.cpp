@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "nephele/levelset/grid/bake.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/shape/shapes.h"
+#include "tests/support/run_program.h"
+#include "tests/support/test_data.h"
+
+namespace nephele::test {
+namespace {
+
+class TransformVerb : public testing::Test {
+ protected:
+  void run(const std::string& arguments) {
+    const ProgramResult result = runProgram("transform " + arguments + " --quiet");
+    EXPECT_EQ(result.exitCode, 0) << arguments << ": " << result.errors;
+  }
+  std::string file(const std::string& name) { return folder_.file(name); }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(TransformVerb, ChangesUpAxisUnitAndPlaceOfAMesh) {
+  std::ofstream(file("a.obj")) << "v 0 0 100\nv 200 0 100\nv 0 100 100\nv 0 0 400\nf 1 2 3 4\n";
+  run(file("a.obj") + " -o " + file("b.obj") + " --up-axis z --unit cm --place ground --move 0,0,5");
+  const Mesh mesh = readMesh(file("b.obj"));
+  // z is up: (x, y, z) becomes (x, z, -y), in metres. The box is 2 x 3 x 1.
+  const Box box = boundingBox(mesh);
+  EXPECT_NEAR(box.min.x, -1, 1e-6f);
+  EXPECT_NEAR(box.min.y, 0, 1e-6f);
+  EXPECT_NEAR(box.max.y, 3, 1e-6f);
+  EXPECT_NEAR(box.min.z, 4.5f, 1e-6f);
+  EXPECT_NEAR(box.max.z, 5.5f, 1e-6f);
+  EXPECT_EQ(mesh.faceCount(), 1u);
+  // And back again.
+  run(file("b.obj") + " -o " + file("c.obj") + " --to-up-axis z --to-unit cm --place centre");
+  EXPECT_NEAR(boundingBox(readMesh(file("c.obj"))).size().z, 300, 1e-4f);
+}
+
+TEST_F(TransformVerb, MovesLevelSetsAndDensitiesWithoutResampling) {
+  const auto shape = bakeGrid(sphere({0.1f, 0, 0}, 0.5f),
+                              {.voxelSize = 0.05f, .box = {{-1, -1, -1}, {1, 1, 1}}, .band = {-0.2f, 0.2f}});
+  writeVdbFile(file("a.vdb"),
+               {toVdb(*shape, {"surface", VdbGridInfo::Class::levelSet}), toVdb(*shape, {"density"})}, {});
+  run(file("a.vdb") + " -o " + file("b.vdb") + " --scale 2 --rotate 0,90,0 --move 0,3,0");
+  const auto before = toBricks(readScalarGrid(file("a.vdb"), "surface")),
+             after = toBricks(readScalarGrid(file("b.vdb"), "surface"));
+  const ScalarField from = gridField(before), to = gridField(after);
+  // About y by 90 degrees z goes to x, and x to -z. Distances are twice as large.
+  for (const Vec3f& p : {Vec3f{0.55f, 0.1f, 0.05f}, Vec3f{0.1f, -0.45f, 0.1f}, Vec3f{-0.2f, 0.2f, 0.3f}})
+    EXPECT_NEAR(to(Vec3f{2 * p.z, 2 * p.y + 3, -2 * p.x}), 2 * from(p), 1e-4f);
+  // Others keep their values.
+  const ScalarField density = gridField(toBricks(readScalarGrid(file("b.vdb"), "density")));
+  const Vec3f p{0.3f, 0.2f, 0.1f};
+  EXPECT_NEAR(density(Vec3f{2 * p.z, 2 * p.y + 3, -2 * p.x}), from(p), 1e-4f);
+}
+
+TEST_F(TransformVerb, RefusesWhatDoesNotFit) {
+  std::ofstream(file("a.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const struct {
+    std::string arguments;
+    int exitCode;
+    std::string message;
+  } cases[] = {{file("a.obj") + " -o " + file("b.vdb"), 2, "a mesh becomes a mesh"},
+               {file("a.obj") + " -o " + file("b.obj") + " --scale 0", 2, "--scale"},
+               {file("a.obj") + " -o " + file("b.obj") + " --up-axis x", 2, "--up-axis"},
+               {file("a.obj") + " -o " + file("b.obj") + " --unit parsec", 2, "--unit"},
+               {file("none.obj") + " -o " + file("b.obj"), 1, "none.obj"}};
+  for (const auto& c : cases) {
+    const ProgramResult result = runProgram("transform " + c.arguments);
+    EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
+    EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
+  }
+  EXPECT_EQ(folder_.entryCount(), 1u);
+}
+
+}  // namespace
+}  // namespace nephele::test
