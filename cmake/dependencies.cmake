@@ -37,6 +37,11 @@ if("render" IN_LIST NEPHELE_PARTS)
   find_package(Imath REQUIRED)
   find_package(OpenEXR REQUIRED)
   find_package(PNG REQUIRED)
+  if(NEPHELE_WITH_OCIO)
+    # Debian's has no CMake configuration.
+    find_path(OPENCOLORIO_INCLUDE_DIR OpenColorIO/OpenColorIO.h REQUIRED)
+    find_library(OPENCOLORIO_LIBRARY OpenColorIO REQUIRED)
+  endif()
 endif()
 
 if(NEPHELE_BUILD_APPS)

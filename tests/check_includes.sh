@@ -78,6 +78,7 @@ onlyIn '(openvdb|nanovdb)/' 'levelset/io/|levelset/grid/openvdb_|levelset/(mesh|
 onlyIn 'CGAL/' 'levelset/(mesh|cut)/' 'CGAL is for levelset/mesh and levelset/cut alone'
 onlyIn 'OpenMesh/' 'levelset/(mesh|warp)/' 'OpenMesh is for levelset/mesh and levelset/warp alone'
 onlyIn 'embree' 'levelset/mesh/|render/scene/' 'Embree is for levelset/mesh and render/scene alone'
+onlyIn 'OpenColorIO' 'render/image/' 'OpenColorIO is for render/image alone'
 onlyIn '(OpenEXR|Imf|Imath)' 'render/image/' 'OpenEXR is for render/image alone'
 onlyIn '(CLI|toml\+\+)/' 'apps/' 'CLI11 and toml++ are for apps/ alone'
 onlyIn '(fftw3|kissfft)' 'modeling/noise/|levelset/flow/' 'Fourier transforms are for modeling/noise and levelset/flow alone'

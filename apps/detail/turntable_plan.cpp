@@ -61,10 +61,11 @@ class Hash {
 };
 
 // What the pixels of a frame do not depend on, or only by its number.
-constexpr std::array kOthers{
-    "output", "frames",   "preview", "movie",         "fps",          "contact-sheet",  "only",
-    "shard",  "exposure", "config",  "skip-existing", "background",   "display-server", "threads",
-    "quiet",  "verbose",  "stats",   "progress",      "memory-limit", "help",           "overwrite"};
+constexpr std::array kOthers{"output",        "frames", "preview",       "movie",      "fps",
+                             "contact-sheet", "only",   "shard",         "exposure",   "view-transform",
+                             "ocio-config",   "config", "skip-existing", "background", "display-server",
+                             "threads",       "quiet",  "verbose",       "stats",      "progress",
+                             "memory-limit",  "help",   "overwrite"};
 
 std::string digestOf(const TurntableOptions& options, int first, int last) {
   Hash hash;

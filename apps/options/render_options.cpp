@@ -120,21 +120,18 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember(layers))
       ->default_str("Z");
-  app.add_option_function<double>(
-         "--exposure",
-         [&options](double stops) {
-           if (std::isnan(stops)) refuse("--exposure", "nan", "a number from -20 to 20");
-           options.screen.exposureStops = float(stops);
-         },
-         "Of the preview, in stops.")
-      ->type_name("STOPS")
-      ->check(CLI::Range(-20.0, 20.0))
-      ->default_str("0");
+  addViewOptions(app, options.view);
   addNumbers(
       app, "--background", "R,G,B", 3, 0, kBrightest, [&options](const Vec3f& v) { options.background = v; },
       "Linear colour behind the preview.")
       ->default_str("the sky's");
   addDisplayServer(app, options.displayServer);
+}
+
+PictureOptions PictureOptions::withView(ViewCurve otherwise) const {
+  PictureOptions result = *this;
+  result.screen = view.read(otherwise);
+  return result;
 }
 
 PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostBytes) const {

@@ -9,9 +9,9 @@
 #include "apps/options/camera_options.h"
 #include "apps/options/light_options.h"
 #include "apps/options/quality_options.h"
+#include "apps/options/view_options.h"
 #include "apps/options/volume_options.h"
 #include "nephele/render/image/display_server.h"
-#include "nephele/render/image/image.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"
 
@@ -38,11 +38,16 @@ struct PictureOptions : CameraOptions {
   /// Path traces instead of marching; what both have in common is taken from `render`.
   bool pathTraced = false;
   PathOptions path;
+  ViewOptions view;
+  /// Made from `view` by `withView`.
   ViewTransform screen;
   std::optional<DisplayServer::Options> displayServer;
   /// Behind the preview; the sky's radiance if not given.
   std::optional<Vec3f> background;
 
+  /// These options with `screen` filled in, by `otherwise` where no view was asked for.
+  /// @throws CLI::ValidationError or Error if there is no such view.
+  PictureOptions withView(ViewCurve otherwise = ViewCurve::filmic) const;
   /// These options with everything filled in that follows from `volume`.
   PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
   /// Whether a still reads the samples of the volume's grid after its light has been made.

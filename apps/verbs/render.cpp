@@ -53,14 +53,16 @@ void addOthers(const RenderVerbOptions& options, const RenderVolume& volume, con
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
+  PictureOptions picture = options.picture.withView();
   if (areShapes(options.inputs))
-    return writeShapesPicture(options.inputs, options.objects, options.picture,
+    // Nothing is bright there, and textures are to look as they do.
+    return writeShapesPicture(options.inputs, options.objects, options.picture.withView(ViewCurve::standard),
                               {options.output, options.preview}, run);
   RenderVolume volume =
       readVolumes(options.inputs, options.picture.volumes,
                   {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.inputs.front() + ": the volume is empty, and so is its picture");
-  PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
+  picture = picture.resolved(volume, run.memoryLimitBytes);
   const Camera camera = picture.camera(volume);
   addOthers(options, volume, camera, picture, run);
   run.requireMemory(double(volume.memoryBytes()) + picture.estimateBytes(volume, camera),

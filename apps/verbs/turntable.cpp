@@ -60,13 +60,14 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   if (options.turns == 0) refuseValue("--turns", "0", "a number from -1000 to 1000 that is not 0");
   TurntablePlan plan(options);
   if (plan.frames.empty()) return run.note("no frame of --frames is in this share; nothing to do");
+  PictureOptions picture = options.picture.withView();
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
   const RenderVolume volume =
       readVolumes({options.input}, options.picture.volumes,
                   {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
-  PictureOptions picture = options.picture.resolved(volume, run.memoryLimitBytes);
+  picture = picture.resolved(volume, run.memoryLimitBytes);
   options.objects.addTo(picture, volume, run.memoryLimitBytes);
   const Camera start = firstCamera(options, picture, volume);
   const int width = start.window().width(), height = start.window().height();

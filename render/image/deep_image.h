@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "nephele/modeling/base/math.h"
 #include "nephele/render/image/image.h"
 #include "nephele/render/image/image_camera.h"
 

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/printable.h"
 
 namespace nephele {
@@ -62,57 +61,6 @@ std::size_t notFiniteCount(const Image& image) {
         channel.values, [&](float v) { return !std::isfinite(v) && !(isDepth && std::isinf(v)); }));
   }
   return count;
-}
-
-namespace {
-
-float onScreen(float linear, float shoulder) {
-  if (!(linear > 0)) return 0.0f;
-  const float room = 1.0f - shoulder;
-  const float x =
-      linear <= shoulder ? linear : shoulder + room * (1.0f - std::exp(-(linear - shoulder) / room));
-  return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
-}
-
-// In [-0.5, 0.5), its error high in frequency: hides the steps of 8 bits in smooth skies without visible
-// grain.
-float dither(std::size_t x, std::size_t y) {
-  const double d = 0.7548776662466927 * double(x) + 0.5698402909980532 * double(y);
-  return float(d - std::floor(d)) - 0.5f;
-}
-
-}  // namespace
-
-std::vector<float> displayed(const Image& image, const ViewTransform& view) {
-  image.check();
-  require(view.shoulder >= 0 && view.shoulder < 1, "view transform: shoulder must be within [0, 1)");
-  const std::vector<float>& alpha = image.channel("A").values;
-  const std::vector<float>* colour[] = {&image.channel("R").values, &image.channel("G").values,
-                                        &image.channel("B").values};
-  const float gain = std::exp2(view.exposureStops);
-  const Image::Channel* backdrop[] = {image.find("backdrop.R"), image.find("backdrop.G"),
-                                      image.find("backdrop.B")};
-  const bool hasBackdrop = backdrop[0] && backdrop[1] && backdrop[2];
-  std::vector<float> screen(alpha.size() * 3);
-  parallelFor(alpha.size(), 16384, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i)
-      for (int c = 0; c != 3; ++c) {
-        const float behind = hasBackdrop ? backdrop[c]->values[i] : view.background[c];
-        screen[i * 3 + c] = onScreen(gain * ((*colour[c])[i] + (1.0f - alpha[i]) * behind), view.shoulder);
-      }
-  });
-  return screen;
-}
-
-std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view) {
-  const std::vector<float> screen = displayed(image, view);
-  const auto width = std::size_t(image.width);
-  std::vector<std::uint8_t> bytes(screen.size());
-  for (std::size_t i = 0; i != screen.size(); ++i) {
-    const float value = std::floor(screen[i] * 255.0f + 0.5f + 0.999f * dither(i / 3 % width, i / 3 / width));
-    bytes[i] = std::uint8_t(std::fmin(255.0f, std::fmax(0.0f, value)));
-  }
-  return bytes;
 }
 
 }  // namespace nephele

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "nephele/modeling/base/math.h"
 #include "nephele/render/image/pixel_box.h"
 
 namespace nephele {
@@ -54,24 +52,5 @@ struct Image {
 /// Values that no file can hold as what they are: NaN, and infinity but in depths ("Z", "Z_median", "Z_mean",
 /// where it says that nothing is there).
 std::size_t notFiniteCount(const Image& image);
-
-/// How linear light becomes a picture for the screen.
-///
-/// x = 2^exposureStops * (rgb + (1 - A) background), per channel then  x <= s: x;  x > s: s + (1 - s)(1 -
-/// exp(-(x - s) / (1 - s))), with s = shoulder, which never clips and has no kink, then the sRGB curve.
-struct ViewTransform {
-  float exposureStops = 0.0f;
-  float shoulder = 0.6f;
-  /// Linear radiance behind pictures that have no layer `backdrop`.
-  Vec3f background{};
-};
-
-/// Screen values in [0, 1], three per pixel, of R, G, B and A of `image`. @throws Error if one of them is
-/// missing, or as Image::check does.
-std::vector<float> displayed(const Image& image, const ViewTransform& view);
-
-/// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands
-/// still from frame to frame.
-std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view);
 
 }  // namespace nephele

@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "nephele/render/image/image.h"
+#include "nephele/render/image/view_transform.h"
 
 namespace nephele {
 
-/// A movie made by the program ffmpeg: H.264, yuv420p, tagged as Rec. 709 colours with the sRGB curve.
+/// A movie made by the program ffmpeg: H.264, yuv420p, tagged as Rec. 709 colours with the sRGB curve,
+/// whatever the view of its frames is.
 ///
 /// Frames are piped to ffmpeg, which no shell ever sees; it writes beside `path`, and the movie is renamed
 /// when it is whole. Sizes are made even, as the format needs, by repeating the last column or row.

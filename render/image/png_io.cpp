@@ -126,8 +126,13 @@ void writePng(const std::string& path, const Image& image, const ViewTransform& 
     png_set_IHDR(writer.png, writer.info, png_uint_32(image.width), png_uint_32(image.height), 8,
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
-    for (const auto& [name, value] : metadata) {
+    if (!view.configView && view.curve == ViewCurve::raw)
+      png_set_gAMA(writer.png, writer.info, 1.0);
+    else if (!view.configView)
+      png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
+    auto texts = metadata;
+    texts["view_transform"] = view.name();
+    for (const auto& [name, value] : texts) {
       // libpng takes its texts by pointers that are not const, and copies them.
       png_text text{};
       text.compression = textKind(value);

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "nephele/modeling/base/math.h"
 #include "nephele/render/image/image.h"
 
 namespace nephele {

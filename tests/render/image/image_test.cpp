@@ -1,4 +1,4 @@
-#include "nephele/render/image/image.h"
+#include "nephele/render/image/view_transform.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,61 @@
+#include "apps/options/view_options.h"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "nephele/render/image/config_view.h"
+
+namespace nephele::apps {
+namespace {
+
+constexpr std::array kCurves{ViewCurve::standard, ViewCurve::filmic, ViewCurve::agx, ViewCurve::raw};
+
+std::string fromEnvironment() {
+  const char* path = std::getenv("OCIO");
+  return path ? path : "";
+}
+
+}  // namespace
+
+ViewTransform ViewOptions::read(ViewCurve otherwise) const {
+  ViewTransform view;
+  view.exposureStops = exposureStops;
+  view.curve = otherwise;
+  if (name.empty() && config.empty()) return view;
+  for (const ViewCurve curve : kCurves) {
+    ViewTransform candidate = view;
+    candidate.curve = curve;
+    if (candidate.name() == name) return candidate;
+  }
+  const std::string path = config.empty() ? fromEnvironment() : config;
+  if (path.empty())
+    refuseValue(
+        "--view-transform", name,
+        "standard, filmic, agx, raw, or a view of the configuration that --ocio-config or $OCIO names");
+  view.configView = readConfigView(path, name);
+  return view;
+}
+
+void addViewOptions(CLI::App& app, ViewOptions& options) {
+  app.add_option("--view-transform", options.name,
+                 "How light is shown: by a curve, or by a view of an OpenColorIO configuration.")
+      ->type_name("standard|filmic|agx|raw|[DISPLAY/]VIEW")
+      ->default_str("filmic, or the default view of --ocio-config");
+  app.add_option("--ocio-config", options.config,
+                 "OpenColorIO configuration (.ocio) that views are looked up in.")
+      ->type_name("FILE")
+      ->default_str("$OCIO");
+  app.add_option_function<double>(
+         "--exposure",
+         [&options](double stops) {
+           if (std::isnan(stops)) refuseValue("--exposure", "nan", "a number from -20 to 20");
+           options.exposureStops = float(stops);
+         },
+         "Of the preview, in stops.")
+      ->type_name("STOPS")
+      ->check(CLI::Range(-20.0, 20.0))
+      ->default_str("0");
+}
+
+}  // namespace nephele::apps

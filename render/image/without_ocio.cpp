@@ -1,0 +1,11 @@
+// Views of configurations in builds without OpenColorIO: refused in words.
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/config_view.h"
+
+namespace nephele {
+
+std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string&) {
+  throw Error(path + ": views of configurations need OpenColorIO, and this nephele was built without it");
+}
+
+}  // namespace nephele
