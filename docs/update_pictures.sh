@@ -170,6 +170,20 @@ if picture volumes; then
   padding="" tiles volumes.png 2x2 red.png veil.png fire.png flame.png
 fi
 
+if picture view_transforms; then
+  grow cloud_300.vdb cloud $base --resolution 300 $usual --billow 0.7
+  grow tori.vdb cloud linked_tori_and_cone.obj --resolution 200 --frequency 6x --billow 0.4 --seed 3
+  linings= flames=
+  for view in standard filmic agx raw; do
+    size="--size 320x228 --view-transform $view"
+    show lining_$view cloud_300.vdb $size --sun 195,14,9 --phase mie:12 --sky 0.12,0.16,0.24
+    show flame_$view tori.vdb $size --view 25,8 --density-scale 0.02 --extinction 60 --temperature-grid density --temperature-scale 1800 \
+      --emission-scale 0.05 --sun 90,38,0 --sky 0.002,0.003,0.005
+    linings="$linings lining_$view.png" flames="$flames flame_$view.png"
+  done
+  padding=:pad=4 tiles view_transforms.jpg 4x2 $linings $flames
+fi
+
 if picture recipe; then
   grow recipe.vdb cloud $base --resolution 480 --recipe recipes/cauliflower.toml --flat-base 3%,5%
   show recipe recipe.vdb --size 640x480 --sun 105,36 --extinction 110 --backdrop
