@@ -41,7 +41,7 @@ void addViewOptions(CLI::App& app, ViewOptions& options) {
   app.add_option("--view-transform", options.name,
                  "How light is shown: by a curve, or by a view of an OpenColorIO configuration.")
       ->type_name("standard|filmic|agx|raw|[DISPLAY/]VIEW")
-      ->default_str("filmic, or the default view of --ocio-config");
+      ->default_str("filmic; standard of surfaces alone; the default view of --ocio-config if there is one");
   app.add_option("--ocio-config", options.config,
                  "OpenColorIO configuration (.ocio) that views are looked up in.")
       ->type_name("FILE")

@@ -95,6 +95,16 @@ TEST_F(Views, AreThoseOfTurntablesToo) {
     EXPECT_TRUE(previewSays("screen/Soft/Film", name)) << name;
 }
 
+// Meshes alone are shaded so that nothing is bright, and textures look as they do.
+TEST_F(Views, OfMeshesAloneAreStandardUnlessAskedFor) {
+  const std::string ball = "render " + ownData("data/sphere_uv.obj") + " -o " + folder_.file("a.exr") +
+                           " --preview " + folder_.file("p.png") + " --size 32x24 ";
+  ASSERT_EQ(runProgram(ball).exitCode, 0);
+  EXPECT_TRUE(previewSays("standard"));
+  ASSERT_EQ(runProgram(ball + "--view-transform agx").exitCode, 0);
+  EXPECT_TRUE(previewSays("agx"));
+}
+
 TEST_F(Views, ThatAreNotThereAreRefusedBeforeAnythingIsRead) {
   if (const std::string missing = whatIsMissing(); !missing.empty()) GTEST_SKIP() << missing;
   std::ofstream(folder_.file("broken.ocio")) << "displays: [\n";
