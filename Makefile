@@ -9,7 +9,7 @@ RESULTS := build/demo
 PREFIX := /usr/local
 # ON: warnings end the build.
 STRICT := OFF
-# How long each format is fuzzed, and which: all, or some as "obj vdb".
+# How long each format is fuzzed, 0 for the inputs that are the same every time, and which: all, or some as "obj vdb".
 SECONDS := 60
 FORMATS :=
 

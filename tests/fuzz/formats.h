@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -22,7 +23,9 @@ struct Input {
 using Bytes = std::span<std::uint8_t>;
 
 /// Changes the first `size` of `bytes`, of which all may be used; returns the new size.
-using Mutator = std::size_t (*)(Bytes bytes, std::size_t size, unsigned seed);
+using ByteChange = std::function<std::size_t(Bytes bytes, std::size_t size)>;
+/// Likewise; knows how the format is built, and changes what is inside by `change`.
+using Mutator = std::size_t (*)(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 
 struct Format {
   std::string_view name;

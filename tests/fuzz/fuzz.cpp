@@ -1,4 +1,6 @@
-// One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`.
+// One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`. It writes files to
+// begin from, `--write-seeds=FOLDER`, and changes of them that are the same every time,
+// `--format=obj --write-inputs=FOLDER --seeds=FOLDER --count=300`.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -9,6 +11,7 @@
 #include <memory>
 
 #include "nephele/modeling/base/system.h"
+#include "tests/fuzz/fixed_inputs.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
 #include "tests/fuzz/mutators.h"
@@ -63,7 +66,8 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   nephele::returnLargeBlocksAtOnce();
   // One thread: what is reached depends on the input alone.
   static const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
-  int kept = 1;
+  int kept = 1, count = 0;
+  std::string seeds, inputs;
   for (int i = 1; i < *argc; ++i) {
     const std::string_view argument = (*argv)[i];
     if (argument.starts_with("--format=")) {
@@ -71,6 +75,12 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     } else if (argument.starts_with("--write-seeds=")) {
       writeSeeds(std::string(argument.substr(14)));
       std::exit(0);
+    } else if (argument.starts_with("--write-inputs=")) {
+      inputs = argument.substr(15);
+    } else if (argument.starts_with("--seeds=")) {
+      seeds = argument.substr(8);
+    } else if (argument.starts_with("--count=")) {
+      count = std::stoi(std::string(argument.substr(8)));
     } else {
       (*argv)[kept++] = (*argv)[i];
     }
@@ -80,6 +90,10 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     for (const Format& format : kFormats) names += fmt::format("{}{}", names.empty() ? "" : "|", format.name);
     std::fprintf(stderr, "nephele_fuzz: --format=%s, or --write-seeds=FOLDER\n", names.c_str());
     std::exit(2);
+  }
+  if (!inputs.empty()) {
+    writeFixedInputs(*chosen, seeds, inputs, count);
+    std::exit(0);
   }
   *argc = kept;
   return 0;
@@ -100,6 +114,9 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most,
                                                unsigned seed) {
   using namespace nephele::fuzz;
-  if (chosen->mutator && seed % 4 != 0) return chosen->mutator({data, most}, size, seed);
-  return LLVMFuzzerMutate(data, size, most);
+  const auto change = [](Bytes bytes, std::size_t used) {
+    return LLVMFuzzerMutate(bytes.data(), used, bytes.size());
+  };
+  if (chosen->mutator && seed % 4 != 0) return chosen->mutator({data, most}, size, seed, change);
+  return change({data, most}, size);
 }

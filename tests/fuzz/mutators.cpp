@@ -8,8 +8,6 @@
 #include <optional>
 #include <vector>
 
-extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
-
 namespace nephele::fuzz {
 namespace {
 
@@ -70,10 +68,10 @@ std::optional<Stream> anyStream(const Data& data, unsigned seed) {
   return std::move(found[seed % found.size()]);
 }
 
-Data mutated(Data data, std::size_t most) {
+Data changed(Data data, std::size_t most, const ByteChange& change) {
   const std::size_t size = data.size();
   data.resize(std::max({most, size, std::size_t(1)}));
-  data.resize(LLVMFuzzerMutate(data.data(), size, data.size()));
+  data.resize(change(data, size));
   return data;
 }
 
@@ -121,20 +119,20 @@ void replaceStream(Data& data, const Stream& stream, const Data& packed) {
 }
 
 /// Changes the contents of one compressed block; false where there is none.
-bool changeStream(Data& data, unsigned seed) {
+bool changeStream(Data& data, unsigned seed, const ByteChange& change) {
   const auto stream = anyStream(data, seed);
   if (!stream) return false;
   // As long as before, mostly: blocks hold a known number of values.
   const std::size_t most = seed % 8 == 0 ? stream->contents.size() + 64 : stream->contents.size();
-  Data contents = mutated(stream->contents, most);
+  Data contents = changed(stream->contents, most, change);
   if (seed % 8 != 0) contents.resize(stream->contents.size());
   replaceStream(data, *stream, deflated(contents));
   return true;
 }
 
 /// `data` in place of what was there, unless it has become too long.
-std::size_t store(Bytes bytes, std::size_t size, const Data& data) {
-  if (data.size() > bytes.size()) return LLVMFuzzerMutate(bytes.data(), size, bytes.size());
+std::size_t store(Bytes bytes, std::size_t size, const Data& data, const ByteChange& change) {
+  if (data.size() > bytes.size()) return change(bytes, size);
   std::copy(data.begin(), data.end(), bytes.begin());
   return data.size();
 }
@@ -156,13 +154,13 @@ void correctChecksums(Data& png) {
 
 }  // namespace
 
-std::size_t mutateBlocks(Bytes bytes, std::size_t size, unsigned seed) {
+std::size_t mutateBlocks(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change) {
   Data data = first(bytes, size);
-  if (changeStream(data, seed / 4)) return store(bytes, size, data);
-  return LLVMFuzzerMutate(bytes.data(), size, bytes.size());
+  if (changeStream(data, seed / 4, change)) return store(bytes, size, data, change);
+  return change(bytes, size);
 }
 
-std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed) {
+std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change) {
   constexpr char kMagic[] = "NanoVDB0";
   constexpr std::size_t kLength = 8;
   const auto switchOff = [&](Data& data) {
@@ -174,35 +172,36 @@ std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed) {
   Data data = first(bytes, size);
   if (auto stream = anyStream(data, seed / 4)) {
     switchOff(stream->contents);
-    Data contents = mutated(stream->contents, stream->contents.size());
+    Data contents = changed(stream->contents, stream->contents.size(), change);
     contents.resize(stream->contents.size());
     replaceStream(data, *stream, deflated(contents));
   } else {
-    data = mutated(std::move(data), bytes.size());
+    data = changed(std::move(data), bytes.size(), change);
     switchOff(data);
   }
-  return store(bytes, size, data);
+  return store(bytes, size, data, change);
 }
 
-std::size_t mutatePng(Bytes bytes, std::size_t size, unsigned seed) {
+std::size_t mutatePng(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change) {
   Data data = first(bytes, size);
-  if (seed / 4 % 2 == 0 || !changeStream(data, seed / 8)) data = mutated(std::move(data), bytes.size());
+  if (seed / 4 % 2 == 0 || !changeStream(data, seed / 8, change))
+    data = changed(std::move(data), bytes.size(), change);
   correctChecksums(data);
-  return store(bytes, size, data);
+  return store(bytes, size, data, change);
 }
 
-std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed) {
+std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change) {
   constexpr std::size_t kHeader = 12, kChunk = 8;
   Data data = first(bytes, size);
-  if (size < kHeader + kChunk) return LLVMFuzzerMutate(bytes.data(), size, bytes.size());
+  if (size < kHeader + kChunk) return change(bytes, size);
   const std::size_t text = kHeader + kChunk;
   const std::size_t length = std::min<std::size_t>(numberAt<std::uint32_t>(data, kHeader), size - text);
   const auto middle = data.begin() + std::ptrdiff_t(text + length);
   Data json(data.begin() + std::ptrdiff_t(text), middle), rest(middle, data.end());
   if (seed / 4 % 4 != 0)
-    json = mutated(std::move(json), json.size() + 64);
+    json = changed(std::move(json), json.size() + 64, change);
   else
-    rest = mutated(std::move(rest), rest.size() + 64);
+    rest = changed(std::move(rest), rest.size() + 64, change);
   while (json.size() % 4 != 0) json.push_back(' ');
   data.resize(text);
   setNumber(data, kHeader, std::uint32_t(json.size()));
@@ -210,7 +209,7 @@ std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed) {
   if (rest.size() >= kChunk) setNumber(rest, 0, std::uint32_t(rest.size() - kChunk));
   data.insert(data.end(), rest.begin(), rest.end());
   setNumber(data, 8, std::uint32_t(data.size()));
-  return store(bytes, size, data);
+  return store(bytes, size, data, change);
 }
 
 }  // namespace nephele::fuzz

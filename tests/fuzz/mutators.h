@@ -11,12 +11,12 @@ namespace nephele::fuzz {
 
 /// Changes what a zlib stream unpacks to, packs it again and corrects the length before it and all places in
 /// the file that are told from its start.
-std::size_t mutateBlocks(Bytes bytes, std::size_t size, unsigned seed);
+std::size_t mutateBlocks(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 /// The same, and switches checksums of NanoVDB grids off.
-std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed);
+std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 /// The same for the pixels of PNG files, with the checksums of all chunks made right.
-std::size_t mutatePng(Bytes bytes, std::size_t size, unsigned seed);
+std::size_t mutatePng(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 /// Changes the JSON or the buffer of a GLB file and corrects the lengths of both.
-std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed);
+std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 
 }  // namespace nephele::fuzz

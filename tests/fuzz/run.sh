@@ -1,10 +1,9 @@
 #!/bin/sh
 # run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
 # how many inputs it ran. What it learns stays in FOLDER/corpus and is where the next run begins; inputs that broke something
-# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds, inputs, findings.
+# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds of a processor, inputs, findings.
 # FUZZ_FILES: further files to begin from, folders of files that are sorted by their extensions.
-# SECONDS of 0: the files to begin from alone, which are the same every time.
-# FUZZ_SEED: nearly the same inputs every time: so many as take some 20 seconds, from the seeds alone, whatever SECONDS is.
+# SECONDS of 0: the same inputs every time, the files to begin from and our own changes of them; their checksum is said.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 program=$1 folder=$2 seconds=$3
@@ -13,6 +12,7 @@ mkdir -p "$folder/corpus" "$folder/findings" "$folder/logs"
 folder=$(cd "$folder" && pwd)
 [ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera toml field calls
 
+rm -rf "$folder/seeds"
 "$program" --write-seeds="$folder/seeds"
 # Larger files make every run slow and teach nothing that small ones do not.
 most=16k
@@ -31,48 +31,47 @@ for files in "$here/../../data" ${FUZZ_FILES:-}; do
   done
 done
 
-# Inputs that take a processor of 2026 about 20 seconds, under the sanitizers.
+# Inputs that take a processor of 2026 about 10 seconds, under the sanitizers.
 inputs_of() {
   case $1 in
-    vdb) echo 200 ;;
-    deep) echo 3000 ;;
-    nvdb | exr) echo 500 ;;
-    png | hdr) echo 1500 ;;
-    chan) echo 3000 ;;
-    camera | gltf | glb) echo 15000 ;;
-    toml | field) echo 5000 ;;
-    *) echo 3000 ;;
+    deep) echo 150 ;;
+    exr | nvdb | obj) echo 300 ;;
+    hdr) echo 400 ;;
+    ply | stl | png) echo 600 ;;
+    chan | gltf | off | vdb) echo 1000 ;;
+    glb) echo 1500 ;;
+    camera | toml | field) echo 3000 ;;
+    *) echo 6000 ;;
   esac
 }
 
 # Memory: a file of some kilobytes may not cost more than this, in one block and in all.
 fuzz() {
-  format=$1 begin=$(date +%s)
-  corpus=$folder/corpus/$format seeds=$folder/seeds/$format limits="-max_total_time=$seconds -timeout=20" fixed=
+  format=$1 same=
+  corpus=$folder/corpus/$format inputs= limits="-max_total_time=$seconds -timeout=20"
   if [ "$seconds" = 0 ]; then
-    corpus=$folder/fixed/$format limits="-runs=0 -timeout=300"
-    rm -rf "$corpus"
-  elif [ -n "${FUZZ_SEED:-}" ]; then
-    # What was learnt before, the order of a folder, what memory comparisons saw, and where all lies in memory would change the
-    # inputs. How long one takes says something of the machine here, so that only what hangs is found.
-    corpus=$folder/fixed/$format limits="-runs=$(inputs_of "$format") -seed=$FUZZ_SEED -use_cmp=0 -use_memmem=0 -timeout=300"
-    rm -rf "$corpus"
-    find "$seeds" -type f | LC_ALL=C sort | paste -s -d , | tr -d '\n' > "$folder/logs/$format.seeds"
-    seeds=-seed_inputs=@$folder/logs/$format.seeds
-    setarch -R true 2> /dev/null && fixed="setarch -R"
+    corpus=$folder/none inputs=$folder/inputs/$format
+    rm -rf "$inputs"
+    "$program" --format="$format" --seeds="$folder/seeds/$format" --write-inputs="$inputs" --count="$(inputs_of "$format")" ||
+      return 1
+    same=", checksum $(cd "$folder" && find "seeds/$format" "inputs/$format" -type f | LC_ALL=C sort | xargs cksum | cksum | cut -d ' ' -f 1)"
+    # How long an input takes says something of the machine here, so that only what hangs is found.
+    limits="-runs=0 -timeout=300"
   fi
   mkdir -p "$corpus"
   dictionary="$here/dictionaries/$format.dict"
   [ -f "$dictionary" ] && dictionary="-dict=$dictionary" || dictionary=
   ASAN_OPTIONS=quarantine_size_mb=16:allocator_release_to_os_interval_ms=500 \
   LSAN_OPTIONS=suppressions="$here/../support/lsan_suppressions.txt":print_suppressions=0 \
-  $fixed "$program" --format="$format" $limits -malloc_limit_mb=300 -rss_limit_mb=1500 \
+  "$program" --format="$format" $limits -malloc_limit_mb=300 -rss_limit_mb=1500 \
     -print_final_stats=1 $dictionary -artifact_prefix="$folder/findings/$format-" \
-    "$corpus" "$seeds" > "$folder/logs/$format.log" 2>&1 && state="none" || state="FOUND"
+    "$corpus" $inputs "$folder/seeds/$format" > "$folder/logs/$format.log" 2>&1 && state="none" || state="FOUND"
   # In lines that are written whole, as formats end at any time.
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$folder/logs/$format.log")
-  printf '%-8s %12s inputs, findings: %s\n' "$format" "${runs:-?}" "$state"
-  printf '%s %s %s %s\n' "$format" $(($(date +%s) - begin)) "${runs:-0}" "$state" >> "$folder/history"
+  times > "$folder/logs/$format.times"
+  busy=$(sed 's/[ms]/ /g' "$folder/logs/$format.times" | awk 'NR == 2 { printf "%d", 60 * $1 + $2 + 60 * $3 + $4 }')
+  printf '%-8s %9s inputs in %s s%s, findings: %s\n' "$format" "${runs:-?}" "$busy" "$same" "$state"
+  printf '%s %s %s %s\n' "$format" "$busy" "${runs:-0}" "$state" >> "$folder/history"
   [ "$state" = none ]
 }
 

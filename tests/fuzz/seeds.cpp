@@ -210,6 +210,11 @@ void writeVolumeSeeds(const std::string& parent) {
     openvdb::io::File file(vdb.file(name));
     file.setCompression(compression);
     file.write(grids);
+    // Files are numbered at random, and seeds are to be the same every time.
+    constexpr int kNumberPlace = 21, kNumberSize = 36;
+    std::fstream(vdb.file(name), std::ios::binary | std::ios::in | std::ios::out)
+        .seekp(kNumberPlace)
+        .write(std::string(kNumberSize, '0').data(), kNumberSize);
   };
   using namespace openvdb::io;
   write("fog_none.vdb", {fog}, COMPRESS_NONE);

@@ -12,6 +12,7 @@
 #include "apps/options/layer_recipe.h"
 #include "apps/options/velocity_options.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/render/scene/camera_file.h"
@@ -123,7 +124,8 @@ void useFieldTexts(const Input& input) {
     apps::FieldSources fields = sources(run);
     sample(fields.field(value));
   });
-  mayFail("--velocity", [&] {
+  // A file is named by itself.
+  mayFail(isVolumeFile(text) ? printable(text) : "--velocity", [&] {
     apps::VelocityArguments velocity;
     apps::parseVelocity("--velocity", text, velocity);
     sample(velocity.field(1.0));
