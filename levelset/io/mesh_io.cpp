@@ -147,8 +147,9 @@ double TextScanner::number(const char* what) {
 
 float TextScanner::single(const char* what) {
   const double value = number(what);
-  if (std::fabs(value) > double(std::numeric_limits<float>::max()))
-    fail(fmt::format("{} is too large: {:g}", what, value));
+  // The largest float written as nine digits is a little above it.
+  constexpr double kRoundsToInfinity = 0x1.ffffffp127;
+  if (std::fabs(value) >= kRoundsToInfinity) fail(fmt::format("{} is too large: {:g}", what, value));
   return float(value);
 }
 

@@ -218,6 +218,12 @@ TEST(MeshIo, WritingFloatsAsTextAndBackGivesTheSameFloats) {
   mesh.addFace(std::vector<std::uint32_t>{0, 1, 2});
   writeMesh(folder.file("a.obj"), mesh);
   EXPECT_EQ(Vec3f(readMesh(folder.file("a.obj")).positions[0]), Vec3f(0.1f, 1.0f / 3, 1e-30f));
+  // In nine digits the largest float is a number above it.
+  constexpr float kMost = std::numeric_limits<float>::max(),
+                  kLeast = std::numeric_limits<float>::denorm_min();
+  mesh.attributes = {{"uv", MeshAttribute::Domain::corner, 2, {kMost, -kMost, kLeast, 0.1f, 0, 1}}};
+  writeMesh(folder.file("b.obj"), mesh);
+  EXPECT_EQ(test::attributeOf(readMesh(folder.file("b.obj")), "uv").values, mesh.attributes[0].values);
 }
 
 }  // namespace
