@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
@@ -107,6 +109,12 @@ std::pair<OCIO::GroupTransformRcPtr, std::string> entrance(const OCIO::ConstConf
 std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string& view) {
   const Silence silence;
   try {
+    // What is no file, or no text that a person could have written, is not for a parser.
+    constexpr std::uintmax_t kMostBytes = 64 << 20;
+    std::error_code error;
+    require(std::filesystem::is_regular_file(path, error), "is no file that can be read");
+    require(std::filesystem::file_size(path, error) <= kMostBytes,
+            "is too large for an OpenColorIO configuration");
     const OCIO::ConstConfigRcPtr config = OCIO::Config::CreateFromFile(path.c_str());
     const auto [display, name] = chosen(config, view);
     const auto [steps, space] = entrance(config);
