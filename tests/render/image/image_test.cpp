@@ -1,10 +1,11 @@
-#include "nephele/render/image/view_transform.h"
+#include "nephele/render/image/image.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/image/view_transform.h"
 
 namespace nephele {
 namespace {
