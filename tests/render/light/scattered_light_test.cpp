@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
 #include "tests/support/density.h"
+#include "tests/support/each_target.h"
 
 namespace nephele {
 namespace {
@@ -95,6 +97,36 @@ TEST(ScatteredLight, IsTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(many.mean(), one.mean());
   EXPECT_EQ(many.towards({{}, Vec3f{0, 1, 0}}), one.towards({{}, Vec3f{0, 1, 0}}));
   EXPECT_EQ(many.sweeps(), one.sweeps());
+}
+
+TEST(ScatteredLight, GoesToTheEyeTogetherAsItDoesAlone) {
+  const RenderVolume volume(ball(1.0f, 0.1f));
+  const Vec3f towards{0.3f, 0.8f, 0.4f};
+  const LightVolume sun(volume, towards);
+  const Scattering cloud = scattering(20.0f, 0.98f, 0.85f);
+  // The third stands in another medium, and the last is the fourth of one.
+  const ScatteredLight lights[] = {
+      {volume, cloud, ScatteredSource::of(sun, towards)},
+      {volume, cloud, ScatteredSource::evenSky()},
+      {volume, scattering(5.0f, 0.9f), ScatteredSource::evenSky()},
+      {volume, cloud, ScatteredSource::evenSky()},
+      {volume, cloud, ScatteredSource::of(sun, towards)},
+  };
+  std::vector<const ScatteredLight*> all;
+  for (const ScatteredLight& light : lights) all.push_back(&light);
+  const Viewpoint viewpoint{Vec3f{0, 1, 5}, {}};
+  const auto best = ScatteredLight::towards(all, viewpoint);
+  test::forEachTarget([&] {
+    const auto together = ScatteredLight::towards(all, viewpoint);
+    for (std::size_t k = 0; k != all.size(); ++k) {
+      EXPECT_EQ(together[k], all[k]->towards(viewpoint)) << k;
+      // A line may end a step earlier, where a hundredth of it is left, by the rounding of another target.
+      const float most = *std::ranges::max_element(best[k]);
+      EXPECT_GT(most, 0.01f);
+      for (std::size_t i = 0; i != best[k].size(); ++i)
+        ASSERT_NEAR(together[k][i], best[k][i], 0.01f * most) << k << " " << i;
+    }
+  });
 }
 
 TEST(ScatteredLight, EndsWithinItsTolerance) {
