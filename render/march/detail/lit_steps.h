@@ -70,6 +70,10 @@ class LitSteps {
       return steps;
     };
     Part first = part(0);
+    if (count_ == kLanes) {
+      count_ = 0;
+      return first;
+    }
     if (full()) {
       const Part next = part(kLanes);
       hn::StoreU(next.s, d, s_);

@@ -127,8 +127,12 @@ class Marcher {
       LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
       weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
             steps);
-      lit_.add(steps);
-      if (lit_.full()) light(lit_.take());
+      if (lit_.empty() && hn::AllTrue(d, hn::Gt(steps.weightOfAll(), hn::Zero(d)))) {
+        light(steps);
+      } else {
+        lit_.add(steps);
+        if (lit_.full()) light(lit_.take());
+      }
     }
     return *std::max_element(through_, through_ + kColours) > scene_.cutoff;
   }
