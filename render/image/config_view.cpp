@@ -37,7 +37,9 @@ Views viewsOf(const OCIO::ConstConfigRcPtr& config) {
   const std::string standard = config->getDefaultDisplay();
   std::vector<std::string> displays;
   for (int i = 0; i != config->getNumDisplays(); ++i) displays.emplace_back(config->getDisplay(i));
-  std::ranges::stable_partition(displays, [&](const std::string& display) { return display == standard; });
+  // clang 14 does not take the ranges' own stable_partition of this standard library.
+  std::stable_partition(displays.begin(), displays.end(),
+                        [&](const std::string& display) { return display == standard; });
   for (const std::string& display : displays)
     for (int i = 0; i != config->getNumViews(display.c_str()); ++i)
       views.emplace_back(display, config->getView(display.c_str(), i));
