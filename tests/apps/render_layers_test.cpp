@@ -120,6 +120,27 @@ TEST_F(RenderLayers, AHoldoutInTheMiddleLeavesTheFrontHalf) {
   EXPECT_NEAR(readImage(folder.file("a.exr")).at("A", 16, 12), 0.5f, 0.01f);
 }
 
+TEST_F(RenderLayers, TwoInOnePlaceAddUpToBothHoweverDense) {
+  // A ball held out by its own deep picture: of the two in one place each is half of what both are,
+  // (1 - (1 - a)^2) / 2. At extinction 60 a step of a voxel is 6 free paths long. Pixels at the rim, whose
+  // rays differ, are not compared.
+  const TemporaryFolder folder;
+  for (const char* extinction : {"1", "8", "60"}) {
+    const std::string options = std::string(" --view 0,0 --light-quality draft --extinction ") + extinction;
+    ASSERT_EQ(
+        runProgram(start() + folder.file("a.exr") + options + " --deep " + folder.file("d.exr")).exitCode, 0);
+    ASSERT_EQ(
+        runProgram(start() + folder.file("b.exr") + options + " --holdout " + folder.file("d.exr")).exitCode,
+        0);
+    const Image whole = readImage(folder.file("a.exr")), held = readImage(folder.file("b.exr"));
+    for (int y = 9; y != 15; ++y)
+      for (int x = 13; x != 19; ++x) {
+        const float left = 1 - whole.at("A", x, y);
+        EXPECT_NEAR(held.at("A", x, y), (1 - left * left) / 2, 0.05f) << extinction << ": " << x << ", " << y;
+      }
+  }
+}
+
 TEST_F(RenderLayers, AHoldoutOfAnotherCameraIsRefused) {
   const TemporaryFolder folder;
   const std::string deep = folder.file("d.exr"), made = " --extinction 1 --light-quality draft --view 20,5 ";

@@ -19,6 +19,9 @@ namespace nephele::detail {
 
 namespace {
 
+// The largest 16 bit number below 1.
+constexpr float kNearlyOpaque = 1 - 1.0f / 2048;
+
 float most(const Vec3f& v) {
   return std::max({v.x, v.y, v.z});
 }
@@ -174,6 +177,17 @@ std::vector<DeepSample> DeepPixel::samples(std::vector<Event>& events, std::size
   return cut();
 }
 
+// A thin sample behind the last one, of what it may not hold.
+void DeepPixel::close(std::vector<DeepSample>& samples, const FlatPixel& front) const {
+  constexpr float kWorthIt = 1e-4f;
+  const float left = 1 - front.alpha, missing = mean_.back().opacity - front.alpha;
+  if (!(left > 0) || missing < kWorthIt || samples.empty()) return;
+  DeepSample last{samples.back().zBack, samples.back().zBack, roundedToHalf(std::min(missing / left, 1.0f))};
+  for (int c = 0; c != 3; ++c)
+    last.colour[c] = roundedToHalf(std::max((mean_.back().colour[c] - front.colour[c]) / left, 0.0f));
+  samples.push_back(last);
+}
+
 // Samples as long as they can be.
 std::vector<DeepSample> DeepPixel::cut() {
   std::vector<DeepSample> result;
@@ -201,6 +215,9 @@ std::vector<DeepSample> DeepPixel::cut() {
         const float scale = 1 / left;
         DeepSample sample{mean_[first].z, mean_[last].z,
                           roundedToHalf(std::clamp((mean_[last].opacity - front.alpha) * scale, 0.0f, 1.0f))};
+        // All of what has alpha 1 is opaque from its front on, to all who read it.
+        if (sample.zBack > std::nextafter(sample.z, INFINITY))
+          sample.alpha = std::min(sample.alpha, kNearlyOpaque);
         for (int c = 0; c != 3; ++c)
           sample.colour[c] = roundedToHalf(std::max((mean_[last].colour[c] - front.colour[c]) * scale, 0.0f));
         if (sample.alpha > 0 || sample.colour != Vec3f{}) {
@@ -212,6 +229,7 @@ std::vector<DeepSample> DeepPixel::cut() {
     }
     first = last;
   }
+  close(result, front);
   result.shrink_to_fit();
   return result;
 }

@@ -52,6 +52,7 @@ class DeepPixel {
 
   void merge();
   std::vector<DeepSample> cut();
+  void close(std::vector<DeepSample>& samples, const FlatPixel& front) const;
   bool fits(std::size_t first, std::size_t last) const;
 
   DeepOptions options_;

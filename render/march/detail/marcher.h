@@ -155,8 +155,9 @@ class Marcher {
   // What the holdout leaves of every step, and of its opacity.
   void hold(float before, const float* after, int used) {
     for (int i = 0; i != used; ++i) {
-      const float middle = ray_.start + begin_[i] + 0.5f * ds_[i];
-      seen_[i] = ray_.holdout.transmittance(middle * ray_.cosine, holdoutCursor_);
+      const float begin = ray_.start + begin_[i];
+      seen_[i] = ray_.holdout.seen(begin * ray_.cosine, (begin + ds_[i]) * ray_.cosine, after[i] - before,
+                                   holdoutCursor_);
       for (int c = 0; c != 3; ++c) {
         const float share = scene_.extinctionColour[c];
         result_.heldOpacity[c] += seen_[i] * (std::exp(-std::min(before * share, 80.0f)) -
