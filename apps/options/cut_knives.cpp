@@ -52,6 +52,11 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     run.begin("scatter");
     knives.cells = scatteredPoints(parts, a.cellCount, std::uint32_t(a.seed));
   }
+  if (amplitude > 0)
+    knives.cellRoughness = {.amplitude = amplitude,
+                            .noise = {.frequency = float(a.roughnessFrequency.perWorldUnit(side)),
+                                      .seed = std::uint32_t(a.seed) * 7919u + 4001u},
+                            .octaves = a.octaves};
   if (!a.points.empty())
     for (const Vec3d& p : readPoints(a.points).positions) knives.cells.emplace_back(p);
   if (result.names.empty() && knives.cells.empty())

@@ -59,6 +59,7 @@ Pieces cutIntoLevelSets(const ScalarField& shape, const PieceLattice& lattice, c
                         const CutOptions& options, const Progress& progress) {
   requireLattice(lattice);
   detail::requireKnives(knives, options);
+  require(knives.cellRoughness.amplitude == 0, "cut: rough cells part meshes only, not level sets");
   const CutPlan plan{lattice, asFields(knives, double(lattice.voxelSize), options.kerf, progress),
                      knives.cells, options.kerf};
   progress.begin("find pieces");

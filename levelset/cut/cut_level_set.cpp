@@ -105,6 +105,7 @@ Pieces cutLevelSet(const BrickGrid& level, const Mesh& whole, const Knives& kniv
                    const Progress& progress) {
   requireValid(whole);
   requireKnives(knives, options);
+  require(knives.cellRoughness.amplitude == 0, "cut: rough cells part meshes only, not level sets");
   CutOptions flatOptions = options;
   if (!options.minVolume) flatOptions.minVolume = std::abs(double(determinant(level.indexToWorld().linear)));
   std::vector<std::tuple<Vec3f, Vec3f>> planes;

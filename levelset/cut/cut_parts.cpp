@@ -152,8 +152,10 @@ void nameThem(Pieces& pieces, const CutPart& part, bool isUntouched) {
 
 Pieces cutPart(const CutPart& part, const Knives& knives, const CutOptions& options,
                const Progress& progress) {
-  Pieces result = part.level ? detail::cutLevelSet(*part.level, part.mesh, knives, options, progress)
-                             : cutIntoMeshes(part.mesh, knives, options, progress);
+  // Rough cells part meshes only; one of the level set is at hand.
+  Pieces result = part.level && knives.cellRoughness.amplitude == 0
+                      ? detail::cutLevelSet(*part.level, part.mesh, knives, options, progress)
+                      : cutIntoMeshes(part.mesh, knives, options, progress);
   nameThem(result, part, part.parent && result.pieces.size() == 1 && isUncut(result.pieces[0], part));
   return result;
 }

@@ -24,6 +24,9 @@ struct Knives {
   std::vector<BladePlane> planes{};
   /// Points whose Voronoi cells part what is cut, too. Empty: none.
   std::vector<Vec3f> cells{};
+  /// Roughens the walls between cells, of meshes only and without a kerf; amplitude 0: they are flat. Cells
+  /// that touch share one rough wall, triangle by triangle.
+  RoughnessOptions cellRoughness{};
   /// Rough blades: the positive side is above the hills.
   std::vector<RoughBlade> rough{};
   /// Closed meshes: the positive side is inside.

@@ -132,6 +132,24 @@ TEST_F(CutVerb, RoughPlanesAreWavyAndKeepTheVolume) {
   EXPECT_NEAR(double(stats()["volume_sum"]) / double(stats()["volume_original"]), 1, 2e-3);
 }
 
+TEST_F(CutVerb, RoughCellsAreRoughAndKeepTheVolume) {
+  cut(ball() + " --voronoi 6 --seed 2");
+  const double flat = [&] {
+    double area = 0;
+    for (const auto& piece : statsOfPieces()) area += double(piece["area"]);
+    return area;
+  }();
+  cut(ball() + " --voronoi 6 --seed 2 --roughness 2% --roughness-octaves 2");
+  double area = 0;
+  for (const auto& piece : statsOfPieces()) {
+    EXPECT_TRUE(piece["closed"]);
+    area += double(piece["area"]);
+  }
+  EXPECT_GT(area, 1.02 * flat);
+  EXPECT_NEAR(double(stats()["volume_sum"]) / double(stats()["volume_original"]), 1, 1e-8);
+  EXPECT_EQ(attempt(ball() + " --voronoi 6 --roughness 2% --kerf 1%").exitCode, 1);
+}
+
 TEST_F(CutVerb, AKerfTakesItsWidthTimesTheAreaAway) {
   for (const std::string geometry : {"exact", "levelset --resolution 100"}) {
     cut(box() + " --plane 0,0,0,1,0,0 --kerf 0.1 --geometry " + geometry);

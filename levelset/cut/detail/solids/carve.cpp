@@ -111,13 +111,23 @@ class Carver {
         for (std::size_t k = i; k < end; ++k) {
           const std::uint32_t other = entries[k].facet;
           if (surfaces_[other] == first) continue;
-          also_[facet].emplace_back(surfaces_[other], isEven(vertices(facet)) == isEven(vertices(other)));
+          Labels labels = labelsOf(other);
+          if (isEven(vertices(facet)) != isEven(vertices(other))) std::swap(labels[0], labels[1]);
+          also_[facet].emplace_back(surfaces_[other], labels);
         }
       }
     }
   }
 
-  using Also = std::vector<std::pair<std::uint32_t, bool>>;
+  /// What is behind a facet and before it: sides of a knife, 1 the positive one, or cells.
+  using Labels = std::array<std::uint32_t, 2>;
+  using Also = std::vector<std::pair<std::uint32_t, Labels>>;
+
+  Labels labelsOf(std::uint32_t facet) const {
+    const std::uint32_t surface = surfaces_[facet];
+    if (surface == 0 || sheets_[surface - 1].cells.empty()) return {1, 0};
+    return sheets_[surface - 1].cells[origins_[arrangement_.facets[facet].parent]];
+  }
 
   const Also& alsoOf(std::uint32_t facet) const {
     static const Also none;
@@ -151,6 +161,7 @@ class Carver {
       const bool isSimple = std::all_of(halves.begin() + std::ptrdiff_t(i) + 1,
                                         halves.begin() + std::ptrdiff_t(end), [&](const Half& half) {
                                           return surfaces_[half.facet] == surfaces_[first] &&
+                                                 labelsOf(half.facet) == labelsOf(first) &&
                                                  alsoOf(half.facet) == alsoOf(first);
                                         });
       if (isSimple) {
@@ -178,7 +189,7 @@ class Carver {
       for (const std::uint32_t f : facets) {
         seam.patches.push_back(patchOf_[f]);
         seam.surfaces.push_back(surfaces_[f]);
-        for (const auto& [other, isSame] : alsoOf(f)) seam.surfaces.push_back(other);
+        for (const auto& [other, labels] : alsoOf(f)) seam.surfaces.push_back(other);
       }
       for (auto* list : {&seam.patches, &seam.surfaces}) {
         std::sort(list->begin(), list->end());
@@ -215,7 +226,7 @@ class Carver {
         progress_);
   }
 
-  std::vector<char> sidesOf(std::uint32_t surface, std::size_t count) const {
+  std::vector<std::uint32_t> sidesOf(std::uint32_t surface, std::size_t count) const {
     DisjointSets components(count);
     for (const Seam& seam : seams_) {
       if (std::binary_search(seam.surfaces.begin(), seam.surfaces.end(), surface)) continue;
@@ -226,11 +237,14 @@ class Carver {
         last = patch;
       }
     }
-    const auto sideAt = [&](std::uint32_t patch) {
+    // And how sure it is.
+    const auto sideAt = [&](std::uint32_t patch) -> std::pair<std::uint32_t, double> {
       const TriangleIndices& t = vertices(largest_[patch].first);
       const Vec3d middle = (at(t[0]) + at(t[1]) + at(t[2])) / 3.0;
-      return surface == 0 ? windingNumber(solidPositions_, solidTriangles_, middle) - 0.5
-                          : sheets_[surface - 1].side(middle);
+      if (surface > 0 && sheets_[surface - 1].cellAt) return sheets_[surface - 1].cellAt(middle);
+      const double side = surface == 0 ? windingNumber(solidPositions_, solidTriangles_, middle) - 0.5
+                                       : sheets_[surface - 1].side(middle);
+      return {side > 0, std::abs(side)};
     };
     // The patches to ask are the largest three of each component.
     std::vector<std::array<std::uint32_t, 3>> asked(count, {kNone, kNone, kNone});
@@ -241,7 +255,7 @@ class Carver {
         if (here != kNone && (best == kNone || largest_[here].second > largest_[best].second))
           std::swap(here, best);
     }
-    std::vector<char> inside(count, 0);
+    std::vector<std::uint32_t> inside(count, 0);
     for (std::uint32_t p = 0; p < count; ++p) {
       if (components.root(p) != p) {
         inside[p] = inside[components.root(p)];
@@ -250,32 +264,36 @@ class Carver {
       double surest = 0;
       for (const std::uint32_t patch : asked[p]) {
         if (patch == kNone) break;
-        const double side = sideAt(patch);
-        if (std::abs(side) > std::abs(surest)) surest = side;
+        const auto [side, sureness] = sideAt(patch);
+        if (sureness > surest) {
+          surest = sureness;
+          inside[p] = side;
+        }
         // A winding number near a whole one has said all.
-        if (surface == 0 && std::abs(std::abs(surest) - 0.5) < 0.1) break;
+        if (surface == 0 && std::abs(surest - 0.5) < 0.1) break;
       }
-      inside[p] = surest > 0;
     }
     return inside;
   }
 
   /// The part on the given sides of all sheets, or nothing between the two of a knife.
-  std::uint32_t partOf(const std::vector<bool>& sheetSides) {
-    std::vector<bool> sides;
+  std::uint32_t partOf(const std::vector<std::uint32_t>& sheetSides) {
+    PartKey key;
     for (std::size_t s = 0; s < sheets_.size(); ++s) {
-      if (s > 0 && sheets_[s].knife == sheets_[s - 1].knife) {
+      if (!sheets_[s].cells.empty()) {
+        key.second = sheetSides[s];
+      } else if (s > 0 && sheets_[s].knife == sheets_[s - 1].knife) {
         if (sheetSides[s] != sheetSides[s - 1]) return kNone;
       } else {
-        sides.push_back(sheetSides[s]);
+        key.first.push_back(sheetSides[s] != 0);
       }
     }
-    return parts_.try_emplace(std::move(sides), std::uint32_t(parts_.size())).first->second;
+    return parts_.try_emplace(std::move(key), std::uint32_t(parts_.size())).first->second;
   }
 
-  std::vector<bool> sheetSides(std::uint32_t patch) const {
-    std::vector<bool> sides(sheets_.size());
-    for (std::size_t s = 0; s < sheets_.size(); ++s) sides[s] = isInside_[s + 1][patch] != 0;
+  std::vector<std::uint32_t> sheetSides(std::uint32_t patch) const {
+    std::vector<std::uint32_t> sides(sheets_.size());
+    for (std::size_t s = 0; s < sheets_.size(); ++s) sides[s] = isInside_[s + 1][patch];
     return sides;
   }
 
@@ -285,23 +303,23 @@ class Carver {
     std::vector<std::array<std::uint32_t, 2>> takers(count, {kNone, kNone});
     for (std::uint32_t p = 0; p < count; ++p) {
       const std::uint32_t facet = largest_[p].first, surface = surfaces_[facet];
-      std::vector<bool> sides = sheetSides(p);
+      std::vector<std::uint32_t> sides = sheetSides(p);
       if (surface == 0) {
         // The solid is behind its facets, as the positive side is behind those of sheets.
-        for (const auto& [other, isSame] : alsoOf(facet)) sides[other - 1] = isSame;
+        for (const auto& [other, labels] : alsoOf(facet)) sides[other - 1] = labels[0];
         takers[p][0] = partOf(sides);
       } else if (isInside_[0][p] != 0) {
-        for (const bool isPositive : {true, false}) {
-          sides[surface - 1] = isPositive;
-          for (const auto& [other, isSame] : alsoOf(facet)) sides[other - 1] = isSame == isPositive;
-          takers[p][isPositive ? 0 : 1] = partOf(sides);
+        for (const std::size_t k : {0, 1}) {
+          sides[surface - 1] = labelsOf(facet)[k];
+          for (const auto& [other, labels] : alsoOf(facet)) sides[other - 1] = labels[k];
+          takers[p][k] = partOf(sides);
         }
       }
     }
     Carved result;
-    for (const auto& [sides, number] : parts_) result.parts.push_back({sides, {}});
+    for (const auto& [key, number] : parts_) result.parts.push_back({key.first, {}, key.second});
     std::vector<std::uint32_t> order(parts_.size());
-    for (std::uint32_t i = 0; const auto& [sides, number] : parts_) order[number] = i++;
+    for (std::uint32_t i = 0; const auto& [key, number] : parts_) order[number] = i++;
     std::vector<std::uint32_t> firstFrame{0};
     for (const KnifeSheet& sheet : sheets_) {
       result.frames.insert(result.frames.end(), sheet.frames.begin(), sheet.frames.end());
@@ -376,11 +394,12 @@ class Carver {
   /// Per patch: its largest facet and that one's area.
   std::vector<std::pair<std::uint32_t, double>> largest_;
   std::vector<Seam> seams_;
-  /// Per surface and patch.
-  std::vector<std::vector<char>> isInside_;
+  /// Per surface and patch: the side, or the cell.
+  std::vector<std::vector<std::uint32_t>> isInside_;
   /// Per patch: whether it is of a knife and outside the solid.
   std::vector<bool> isOutside_;
-  std::map<std::vector<bool>, std::uint32_t> parts_;
+  using PartKey = std::pair<std::vector<bool>, std::optional<std::uint32_t>>;
+  std::map<PartKey, std::uint32_t> parts_;
 };
 
 }  // namespace

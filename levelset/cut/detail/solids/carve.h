@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,8 @@ struct Carved {
     std::vector<bool> sides;
     /// A closed surface, but not always in one piece.
     std::vector<std::uint32_t> triangles;
+    /// If there are walls between cells among the sheets.
+    std::optional<std::uint32_t> cell{};
   };
   /// By sides, the negative one first. Two parts that meet do so in the same triangles, in reverse.
   std::vector<Part> parts;

@@ -24,9 +24,14 @@ namespace nephele::detail {
 
 namespace {
 
+struct PartCode : PieceCode {
+  /// Of rough cells.
+  std::optional<std::uint32_t> cell{};
+};
+
 struct Part {
   Solid solid;
-  PieceCode code;
+  PartCode code;
 };
 
 /// Parts that share their cut points.
@@ -112,7 +117,7 @@ void keepCell(Family& family, std::span<const Vec3d> cells, std::uint32_t index,
 /// Splits the parts by a plane; with a kerf, what is left is behind one plane or before another.
 void splitByPlane(Family& family, const CutPlane& plane, double halfKerf) {
   std::vector<Part> next;
-  const auto add = [&](Solid&& solid, const PieceCode& code, bool side) {
+  const auto add = [&](Solid&& solid, const PartCode& code, bool side) {
     if (solid.isEmpty()) return;
     next.push_back({std::move(solid), code});
     next.back().code.sides.push_back(side);
@@ -242,7 +247,7 @@ std::vector<Family> split(const CutSource& source, std::span<const Carved::Part>
         std::make_unique<SolidSplitter>(source.positions(), source.triangles(), cells, source.tolerance()),
         {}};
     for (const Carved::Part& part : parts)
-      family.parts.push_back({family.splitter->solidOf(part.triangles), {part.sides}});
+      family.parts.push_back({family.splitter->solidOf(part.triangles), {{part.sides}, part.cell}});
     return family;
   };
   std::vector<Family> families(std::max<std::size_t>(cells.size(), 1));
@@ -305,8 +310,10 @@ Pieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts, co
     for (Part& part : family.parts) work.push_back({&family, &part});
   // No two parts in a cell have one code.
   std::sort(work.begin(), work.end(), [](const auto& a, const auto& b) {
-    return a.first->cell != b.first->cell ? a.first->cell < b.first->cell
-                                          : a.second->code.sides < b.second->code.sides;
+    const auto key = [](const auto& entry) {
+      return std::pair(entry.second->code.cell.value_or(entry.first->cell), entry.second->code.sides);
+    };
+    return key(a) < key(b);
   });
   std::vector<Assembly> assemblies(work.size());
   const double minVolume = std::max(options.minVolume.value_or(0), 1e-12 * source.volume());
@@ -316,8 +323,10 @@ Pieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts, co
         for (std::size_t i = begin; i < end; ++i) {
           auto& [family, part] = work[i];
           assemblies[i] = assemble(source, *family->splitter, part->solid, part->code, minVolume);
-          if (!cells.empty())
-            for (Piece& piece : assemblies[i].pieces) piece.cell = family->cell;
+          for (Piece& piece : assemblies[i].pieces) {
+            if (!cells.empty()) piece.cell = family->cell;
+            if (part->code.cell) piece.cell = part->code.cell;
+          }
         }
       },
       progress);

@@ -39,12 +39,7 @@ class HeightField {
 
     const double diagonal = length(high - low);
     spacing_ = double(blade.spacing);
-    if (spacing_ == 0) {
-      constexpr double kPointsPerWave = 8, kFinest = 400;
-      const double shortest = 1 / (double(blade.roughness.noise.frequency) *
-                                   std::pow(double(blade.roughness.lacunarity), blade.roughness.octaves - 1));
-      spacing_ = std::clamp(shortest / kPointsPerWave, diagonal / kFinest, diagonal / 8);
-    }
+    if (spacing_ == 0) spacing_ = roughSpacing(blade.roughness, diagonal);
     double lowU = INFINITY, highU = -INFINITY, lowV = INFINITY, highV = -INFINITY;
     for (int k = 0; k < 8; ++k) {
       const Vec3d corner{k & 1 ? low.x : high.x, k & 2 ? low.y : high.y, k & 4 ? low.z : high.z};
@@ -301,6 +296,13 @@ PlaneFrame PlaneFrame::of(const Vec3d& normal) {
   const Vec3d u =
       normalize(std::abs(normal.y) < 0.9 ? cross(Vec3d{0, 1, 0}, normal) : cross(Vec3d{0, 0, 1}, normal));
   return {u, cross(normal, u)};
+}
+
+double roughSpacing(const RoughnessOptions& roughness, double size) {
+  constexpr double kPointsPerWave = 8, kFinest = 400;
+  const double shortest =
+      1 / (double(roughness.noise.frequency) * std::pow(double(roughness.lacunarity), roughness.octaves - 1));
+  return std::clamp(shortest / kPointsPerWave, size / kFinest, size / 8);
 }
 
 std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nephele/levelset/cut/knives.h"
@@ -31,7 +33,14 @@ struct KnifeSheet {
   /// Where a point is on the knife: one frame for all triangles, or one for each.
   std::vector<PlaneFrame> frames;
   std::vector<std::uint32_t> frameOf;
+  /// Of walls between cells, which have no sides: the cells behind and before each triangle.
+  std::vector<std::array<std::uint32_t, 2>> cells{};
+  /// The cell at a point, and the larger the number, the surer it is.
+  std::function<std::pair<std::uint32_t, double>(const Vec3d&)> cellAt{};
 };
+
+/// Between the points of a rough surface in a solid of that size: an eighth of the shortest wave.
+double roughSpacing(const RoughnessOptions& roughness, double size);
 
 class CutSource;
 
