@@ -12,7 +12,10 @@
 #include <span>
 
 #include "apps/detail/program_run.h"
+#include "apps/options/common_group.h"
 #include "apps/options/config_file.h"
+#include "apps/options/first_day.h"
+#include "apps/options/old_names.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
 
@@ -42,7 +45,7 @@ std::string commandLineOf(int argc, char** argv) {
 }
 
 void addCommonOptions(CLI::App& app, CommonOptions& options) {
-  const std::string group = "Common to all verbs";
+  const std::string group = kCommonGroup;
   addCount(app, "--threads", options.threads, 0, 4096, "Threads to use; 0: all that the process may use.")
       ->group(group);
   app.add_flag("--quiet", options.quiet, "Print errors only.")->group(group);
@@ -148,6 +151,8 @@ std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments
 int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::string& commandLine) {
   CLI::App app(verb.summary, "nephele " + verb.name);
   app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
+  app.set_help_flag("-h,--help", "Print the options of the first day and exit.");
+  app.set_help_all_flag("--help-all", "Print all options and exit.");
   app.get_formatter()->column_width(34);
   // Collected, so that a suggestion can be made for each.
   app.allow_extras();
@@ -157,9 +162,12 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
 
   const std::string who = "nephele " + verb.name;
   try {
-    arguments = withFilesAfterDashes(std::move(arguments));
+    const auto note = [&](const std::string& sentence) {
+      std::fputs((who + ": " + sentence + "\n").c_str(), stderr);
+    };
+    arguments = withCurrentNames(verb.name, withFilesAfterDashes(std::move(arguments)), note);
     const std::size_t typed = arguments.size();
-    arguments = withConfigFile(app, std::move(arguments));
+    arguments = withConfigFile(app, verb.name, std::move(arguments));
     const std::string configOptions = joined(std::span(arguments).subspan(typed));
     for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
     std::reverse(arguments.begin(), arguments.end());
@@ -179,7 +187,13 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
                             : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return runBody(verb, app, run, options);
+  } catch (const CLI::CallForAllHelp&) {
+    std::cout << app.help();
+    return 0;
   } catch (const CLI::CallForHelp&) {
+    const int count = showFirstDay(app, verb.name);
+    app.footer("'nephele " + verb.name + " --help-all' shows all " + std::to_string(count) + " options.\n" +
+               app.get_footer());
     std::cout << app.help();
     return 0;
   } catch (const CLI::ParseError& error) {
@@ -187,10 +201,18 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
   }
 }
 
+int unknownVerb(const std::string& word, const std::vector<Verb>& verbs) {
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs) names.push_back(verb.name);
+  const std::string meant = closestWord(word, names);
+  return usageError("nephele", fmt::format("unknown verb '{}'{}", word,
+                                           meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
+}
+
 std::string overview(const std::vector<Verb>& verbs) {
   std::string text = "Nephele: clouds and level sets.\nUsage: nephele VERB [OPTIONS]\n\nVerbs:\n";
   for (const Verb& verb : verbs) text += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
-  return text + "\n'nephele VERB --help' explains a verb; 'nephele --version' prints the version.\n";
+  return text + "\n'nephele help VERB' explains a verb; 'nephele --version' prints the version.\n";
 }
 
 }  // namespace
@@ -198,6 +220,12 @@ std::string overview(const std::vector<Verb>& verbs) {
 int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   installSignalHandlers();
   const std::string word = argc > 1 ? argv[1] : "--help";
+  if (word == "help" && argc > 2) {
+    const std::string asked = argv[2];
+    for (const Verb& verb : verbs)
+      if (verb.name == asked) return runVerb(verb, {"--help"}, commandLineOf(argc, argv));
+    return unknownVerb(asked, verbs);
+  }
   if (word == "--help" || word == "-h" || word == "help") {
     std::cout << overview(verbs);
     return argc > 1 ? 0 : kUsage;
@@ -206,15 +234,10 @@ int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
     std::cout << "nephele " << NEPHELE_VERSION << '\n';
     return 0;
   }
-  std::vector<std::string> names;
-  for (const Verb& verb : verbs) {
+  for (const Verb& verb : verbs)
     if (verb.name == word)
       return runVerb(verb, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
-    names.push_back(verb.name);
-  }
-  const std::string meant = closestWord(word, names);
-  return usageError("nephele", fmt::format("unknown verb '{}'{}", word,
-                                           meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
+  return unknownVerb(word, verbs);
 }
 
 }  // namespace nephele::apps

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Puts the program's own --help text into the pages of its verbs, between the marks
+# Puts the program's own --help-all text into the pages of its verbs, between the marks
 #   <!-- help VERB -->  and  <!-- end of help -->
 # With --check it changes nothing and fails where a page is out of date. It also checks that local links lead somewhere.
 # Usage: update_help.sh PROGRAM [--check]
@@ -13,7 +13,7 @@ for page in *.md; do
   verb=$(sed -n 's/^<!-- help \([a-z]*\) -->$/\1/p' "$page" | head -n 1)
   [ -n "$verb" ] || continue
   fresh=$(mktemp)
-  "$program" "$verb" --help >"$fresh.help"
+  "$program" "$verb" --help-all >"$fresh.help"
   awk -v help="$fresh.help" '
     /^<!-- help [a-z]* -->$/ { print; print "```text"; while ((getline line < help) > 0) print line; print "```"; skip = 1; next }
     /^<!-- end of help -->$/ { skip = 0 }

@@ -130,7 +130,7 @@ if picture wisps; then
   keep wisps.png
   grow wisps_clump_small.vdb wisps --guides 1 --dots 3000000 --seed 5 --clump 0.3
   grow wisps_clump_large.vdb wisps --guides 1 --dots 3000000 --seed 5 --clump 1 --density 10
-  options="--shape streak --guides 40 --size 7% --dots 60000 --clump 0.8 --density 8 --seed 2"
+  options="--shape streak --guides 40 --wisp-size 7% --dots 60000 --clump 0.8 --density 8 --seed 2"
   grow wisps_still.vdb wisps $options
   grow wisps_wind.vdb wisps $options --velocity 0.25,-0.1,0 --shutter -1,0
   grow wisps_curl.vdb wisps $options --velocity curl:amplitude=5%,frequency=2x --shutter -0.5,0.5

@@ -28,9 +28,9 @@ void addAdvectOptions(CLI::App& app, AdvectArguments& a) {
   app.add_option_function<std::string>(
          "--velocity", [&a](const std::string& text) { parseVelocity("--velocity", text, a.velocity); },
          "What moves: noise or curl (noise without divergence) with keys amplitude, frequency, octaves, "
-         "lacunarity, roughness, seed, kind, time; or a grid of vectors from a volume.")
+         "lacunarity, roughness, seed, kind, time; one vector for all; or a grid of vectors from a volume.")
       ->required()
-      ->type_name("noise:KEYS|curl:KEYS|FILE");
+      ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
   app.add_option("--velocity-grid", a.velocity.grid,
                  "Grid of the velocity file; default: v, vel, velocity, or the only one of vectors.")
       ->type_name("NAME");

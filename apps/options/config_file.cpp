@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "apps/options/old_names.h"
 #include "apps/options/options.h"
 #include "apps/options/toml_file.h"
 
@@ -37,7 +38,8 @@ std::string textOf(const std::string& path, const std::string& key, const toml::
 
 }  // namespace
 
-std::vector<std::string> withConfigFile(const CLI::App& verb, std::vector<std::string> arguments) {
+std::vector<std::string> withConfigFile(const CLI::App& app, const std::string& verb,
+                                        std::vector<std::string> arguments) {
   std::optional<std::string> path;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == "--config" && i + 1 < arguments.size()) path = arguments[i + 1];
@@ -48,14 +50,14 @@ std::vector<std::string> withConfigFile(const CLI::App& verb, std::vector<std::s
   const toml::table table = readToml("--config", *path);
 
   std::vector<std::string> names;
-  for (const CLI::Option* option : verb.get_options())
+  for (const CLI::Option* option : app.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back(name);
 
   const std::vector<std::string> typed = arguments;
   for (const auto& [name, value] : table) {
-    const std::string key(name.str());
-    const CLI::Option* option = verb.get_option_no_throw("--" + key);
-    if (!option || key == "config" || key == "help") {
+    const std::string key = currentName(verb, "--" + std::string(name.str())).substr(2);
+    const CLI::Option* option = app.get_option_no_throw("--" + key);
+    if (!option || key == "config" || key.starts_with("help")) {
       const std::string meant = closestWord(key, names);
       refuse(*path, value.source().begin,
              fmt::format("'{}' is not an option of this verb{}", key,

@@ -26,10 +26,11 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
   auto* random =
       addCount(app, "--random-planes", a.randomPlanes, 1, 1000000, "Cut by this many random planes.")
           ->default_str("");
-  app.add_flag("--through-centre", a.throughCentre, "Random planes all pass through the middle of the box.")
+  app.add_flag("--through-center", a.throughCentre, "Random planes all pass through the middle of the box.")
       ->needs(random);
-  auto* roughness = addLength(app, "--roughness", a.roughness,
-                              "Roughen all planes, as fracture does: root mean square height.");
+  auto* roughness =
+      addLength(app, "--roughness", a.roughness,
+                "Roughen all planes and walls of cells, as fracture does: root mean square height.");
   addFrequency(app, "--roughness-frequency", a.roughnessFrequency,
                "Hills of the largest size: cycles per world unit, or per longest side (5x).")
       ->needs(roughness);

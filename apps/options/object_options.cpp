@@ -51,7 +51,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
   addInputs(app, "--holdout-object", options.holdouts,
             "The same as a holdout: hides what is behind it, and is not seen itself.");
   addNumbers(
-      app, "--object-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
+      app, "--object-color", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
       "Share of the light that objects scatter.")
       ->default_str("0.5,0.5,0.5");
   addCount(app, "--checker", options.checkers, 0, 10000,
@@ -69,7 +69,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
               "Of the plane; default: the bottom of the volume.")
       ->needs(ground);
   addNumbers(
-      app, "--ground-colour", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.groundColour = v; },
+      app, "--ground-color", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.groundColour = v; },
       "Share of the light that the plane scatters.")
       ->needs(ground)
       ->default_str("0.3,0.3,0.3");
@@ -97,7 +97,7 @@ std::vector<SurfaceObject> ObjectOptions::shapes(const std::vector<std::string>&
 
 void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const {
   const std::pair<const char*, bool> ofObjects[] = {
-      {"--object-colour", colour.has_value()}, {"--checker", checkers > 0}, {"--texture", !texture.empty()}};
+      {"--object-color", colour.has_value()}, {"--checker", checkers > 0}, {"--texture", !texture.empty()}};
   for (const auto& [option, isGiven] : ofObjects)
     if (isGiven && objects.empty())
       throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");

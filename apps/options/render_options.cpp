@@ -64,6 +64,7 @@ void addIntegrator(CLI::App& app, PictureOptions& options) {
       ->check(CLI::IsMember({"march", "path"}))
       ->default_str("march");
   addCount(app, "--spp", options.path.samplesPerPixel, 1, 1 << 20, "Paths per pixel of --integrator path.")
+      ->group("")
       ->each([&options](const std::string&) { options.pathsGiven = true; });
   addCount(app, "--scatterings", options.path.maxScatterings, 0, 1000000,
            "Scatterings at which paths end, 0: never.");
@@ -89,7 +90,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   addChoice<Quality>(
       app, "--quality", options.quality,
       {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
-      "Sets --samples, --step, --adaptive, --spp and --light-quality together, for a first look, a picture, "
+      "Sets --samples, --step, --adaptive and --light-quality together, for a first look, a picture, "
       "or the last one; each of them still says more where it is given.");
   addChoice<std::optional<Quality>>(
       app, "--light-quality", options.lightQuality,
@@ -100,9 +101,10 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->default_str("as --quality");
   addLength(app, "--step", options.step, "Longest step along a ray.", Sign::positive)
       ->default_str("one voxel");
-  addCount(app, "--samples", options.render.samples, 1, 4096, "Rays per pixel.")
+  addCount(app, "--samples", options.render.samples, 1, 1 << 20,
+           "Rays per pixel, at most 4096, or paths with --integrator path.")
       ->each([&options](const std::string&) { options.samplesGiven = true; })
-      ->default_str("4, or 64 with depth of field or motion blur");
+      ->default_str("4, or 64 with depth of field or motion blur; 64 paths");
   addNumber(
       app, "--adaptive", options.adaptiveThreshold, 0, 1,
       "March only pixels whose neighbours differ by more than this share of brightness or opacity; 0: all.")
@@ -160,7 +162,12 @@ void PictureOptions::chooseByQuality(const RenderVolume& volume) {
   const QualityChoices choices = QualityChoices::of(quality);
   render.octaves.order = QualityChoices::of(lightQuality.value_or(quality)).lightOrder;
   if (!samplesGiven) render.samples = choices.samples;
-  if (!pathsGiven) path.samplesPerPixel = choices.pathsPerPixel;
+  if (!pathsGiven) path.samplesPerPixel = samplesGiven ? render.samples : choices.pathsPerPixel;
+  constexpr int kMostRays = 4096;
+  if (!pathTraced && render.samples > kMostRays)
+    refuseValue("--samples", std::to_string(render.samples),
+                fmt::format("a whole number from 1 to {}, but with --integrator path", kMostRays));
+  if (pathTraced) render.samples = std::min(render.samples, kMostRays);
   // The standard step is the marcher's own: longer where the density hardly varies.
   if (!render.step && choices.stepVoxels != 1 && !volume.isEmpty())
     render.step = choices.stepVoxels * volume.density().voxelSize();

@@ -14,7 +14,9 @@ namespace nephele::apps {
 namespace {
 
 constexpr const char* kForm =
-    "noise: or curl: and keys such as amplitude=2%,frequency=6x,octaves=3,seed=1, or a .vdb or .nvdb file";
+    "noise: or curl: and keys such as amplitude=2%,frequency=6x,octaves=3,seed=1, three numbers X,Y,Z, or a "
+    ".vdb or .nvdb "
+    "file";
 
 /// One "key=value" of the option.
 class Entry {
@@ -116,6 +118,12 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
       refuseValue(name, text, "for curl a noise without creases: not worley, not worley_difference");
     return;
   }
+  if (!isVolumeFile(text) && std::count(text.begin(), text.end(), ',') == 2) {
+    const std::vector<double> v = parseNumbers(name, text, kForm);
+    velocity.source = VelocityArguments::Source::constant;
+    velocity.constant = {float(v[0]), float(v[1]), float(v[2])};
+    return;
+  }
   if (!isVolumeFile(text)) refuseValue(name, text, kForm);
   velocity.source = VelocityArguments::Source::file;
   velocity.path = text;
@@ -123,6 +131,7 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
 
 VectorField VelocityArguments::field(double longestSide) const {
   if (source == Source::file) return readVelocity(path, grid);
+  if (source == Source::constant) return VectorField(constant);
   double share = 0;
   for (int i = 0; i < octaves; ++i) share += std::pow(roughness, 2 * i);
   const double rms = amplitude.worldUnits(longestSide) / std::sqrt(share);

@@ -8,9 +8,9 @@
 
 namespace nephele::apps {
 
-/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", or a volume file.
+/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", "-20,0,0", or a volume file.
 struct VelocityArguments {
-  enum class Source { noise, curl, file };
+  enum class Source { noise, curl, constant, file };
 
   Source source = Source::noise;
   /// Rms of each component, per unit of time.
@@ -20,6 +20,8 @@ struct VelocityArguments {
   int octaves = 1, seed = 0;
   double lacunarity = 2, roughness = 0.5;
   std::optional<float> time;
+  /// The same everywhere, world units per unit of time.
+  Vec3f constant{};
   /// Of the file: its path and the name of the grid, or "" to look for the usual ones.
   std::string path, grid;
 

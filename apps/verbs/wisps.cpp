@@ -65,7 +65,7 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
 
 Verb wispsVerb() {
   return verbOf("wisps", "Grows wisps of fine dots on guide particles.",
-                "nephele wisps particles.ply -o wisps.vdb --size 5% --dots 50000", addWispsOptions,
+                "nephele wisps particles.ply -o wisps.vdb --wisp-size 5% --dots 50000", addWispsOptions,
                 makeWisps);
 }
 

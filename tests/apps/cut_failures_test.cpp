@@ -214,7 +214,7 @@ TEST_F(CutVerb, BadOptionsAreUsageErrorsThatNameThem) {
   const ProgramResult none = attempt(model);
   EXPECT_EQ(none.exitCode, 2);
   EXPECT_NE(none.errors.find("no knife"), std::string::npos) << none.errors;
-  EXPECT_EQ(attempt(model + " --through-centre --voronoi 3").exitCode, 2);
+  EXPECT_EQ(attempt(model + " --through-center --voronoi 3").exitCode, 2);
   EXPECT_EQ(attempt(model + " --voronoi 3 --points p.txt").exitCode, 2);
   EXPECT_EQ(attempt(model + " --random-planes 1 --size 10x10").exitCode, 2);
   EXPECT_FALSE(fs::exists(file("out")));

@@ -20,7 +20,7 @@ using nlohmann::json;
 TEST_F(CutVerb, PlanesThroughTheCentreOfABallMakeNSquaredMinusNPlusTwo) {
   const std::string input = ball();
   for (const int n : {3, 5, 8}) {
-    cut(input + " --through-centre --random-planes " + std::to_string(n));
+    cut(input + " --through-center --random-planes " + std::to_string(n));
     const json made = stats();
     const auto expected = std::size_t(n * n - n + 2);
     ASSERT_EQ(made["pieces"].size(), expected);
@@ -46,7 +46,7 @@ TEST_F(CutVerb, CutsLevelSetsExactlyByLinearCells) {
     std::size_t pieces;
   };
   // A convex body: as many pieces as combinations of sides, or cells. Two tools that are one cut once.
-  for (const Way& way : std::vector<Way>{{"--random-planes 5 --through-centre", 22},
+  for (const Way& way : std::vector<Way>{{"--random-planes 5 --through-center", 22},
                                          {"--voronoi 6", 6},
                                          {"--plane 0,0,0,1,0,0 --roughness 2%", 2},
                                          {"--plane 0,0,0,1,0,0 --knife " + tool + " --knife " + tool, 4}}) {

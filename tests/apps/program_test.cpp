@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "tests/support/run_program.h"
@@ -24,11 +25,66 @@ TEST(Program, PrintsItsVersionAndVerbs) {
 
 TEST(Program, HelpOfEveryVerbShowsAnExample) {
   for (const std::string verb : {"levelset", "cloud", "mesh", "render", "info"}) {
-    const ProgramResult help = runProgram(verb + " --help");
+    const ProgramResult help = runProgram(verb + " --help-all");
     EXPECT_EQ(help.exitCode, 0) << verb;
     EXPECT_NE(help.output.find("Example:\n  nephele " + verb), std::string::npos) << help.output;
     EXPECT_NE(help.output.find("--stats"), std::string::npos) << verb;
   }
+}
+
+int optionsShown(const std::string& help) {
+  int count = 0;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) count += line.starts_with("  -");
+  return count;
+}
+
+TEST(Program, HelpShowsTheOptionsOfAFirstDayAndLeadsToAll) {
+  for (const std::string verb :
+       {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render", "turntable", "info"}) {
+    const ProgramResult help = runProgram(verb + " --help"), all = runProgram(verb + " --help-all");
+    EXPECT_EQ(help.exitCode, 0) << verb;
+    // Fifteen or so, and three of help.
+    EXPECT_LE(optionsShown(help.output), 19) << verb;
+    EXPECT_EQ(runProgram("help " + verb).output, help.output) << verb;
+    EXPECT_NE(help.output.find("'nephele " + verb + " --help-all' shows all"), std::string::npos) << verb;
+    EXPECT_NE(help.output.find("Example:\n  nephele " + verb), std::string::npos) << verb;
+    EXPECT_GT(optionsShown(all.output), optionsShown(help.output)) << verb;
+  }
+  const ProgramResult wrong = runProgram("help clod");
+  EXPECT_EQ(wrong.exitCode, 2);
+  EXPECT_NE(wrong.errors.find("did you mean 'cloud'"), std::string::npos) << wrong.errors;
+}
+
+TEST(Program, OldNamesOfOptionsWorkWithOneNote) {
+  const TemporaryFolder folder;
+  const std::string cut = "cut " + kMesh + " --random-planes 2 -o " + folder.file("out") + " ";
+  const ProgramResult before = runProgram(cut + "--through-centre");
+  EXPECT_EQ(before.exitCode, 0) << before.errors;
+  EXPECT_EQ(before.errors,
+            "nephele cut: --through-centre is called --through-center now; the old name still works\n");
+  EXPECT_EQ(runProgram(cut + "--through-center").errors, "");
+  // In configuration files, too; and they are not shown.
+  std::ofstream(folder.file("old.toml")) << "through-centre = true\n";
+  EXPECT_EQ(runProgram(cut + "--config " + folder.file("old.toml")).exitCode, 0);
+  EXPECT_EQ(runProgram("cut --help-all").output.find("centre"), std::string::npos);
+  EXPECT_EQ(runProgram("render --help-all").output.find("-colour"), std::string::npos);
+  EXPECT_EQ(runProgram("render --help-all").output.find("--spp"), std::string::npos);
+}
+
+TEST(Program, TakesVectorsThatBeginWithAMinus) {
+  const TemporaryFolder folder;
+  const std::string volume = folder.file("a.vdb");
+  ASSERT_EQ(runProgram("cloud " + kMesh + " --layers 1 --resolution 12 -o " + volume).exitCode, 0);
+  // Half a voxel along -x moves the density there.
+  const ProgramResult moved =
+      runProgram("advect " + volume + " --velocity -20,0,0 --dt 0.1 -o " + folder.file("b.vdb"));
+  EXPECT_EQ(moved.exitCode, 0) << moved.errors;
+  const VdbGridInfo from = describe(readVdbFile(volume)[0]),
+                    to = describe(readVdbFile(folder.file("b.vdb"))[0]);
+  const double voxels = 20 * 0.1 / double(from.voxelSize.x);
+  EXPECT_NEAR(double(to.indexMin.x - from.indexMin.x), -voxels, 2);
+  EXPECT_NEAR(double(to.indexMax.x - from.indexMax.x), -voxels, 2);
 }
 
 TEST(Program, WithoutAVerbIsAUsageError) {

@@ -221,7 +221,7 @@ TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
     return readImage(folder.file("a.exr"));
   };
   // Irradiance pi makes the radiance of a surface its colour; beside the ball nothing else is there.
-  const Image image = make("--aov light --object " + wall + " --object-colour 0.6,0.4,0.2");
+  const Image image = make("--aov light --object " + wall + " --object-color 0.6,0.4,0.2");
   EXPECT_NEAR(image.at("R", 2, 12), 0.6f, 2e-3f);
   EXPECT_NEAR(image.at("B", 2, 12), 0.2f, 2e-3f);
   EXPECT_EQ(image.at("A", 2, 12), 1.0f);
@@ -229,7 +229,7 @@ TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
   // In the shadow of the ball, and behind it: a quarter twice.
   EXPECT_NEAR(image.at("light_objects.R", 16, 12), 0.6f / 16, 6e-3f);
   EXPECT_EQ(
-      make("--aov light --threads 1 --object " + wall + " --object-colour 0.6,0.4,0.2").channel("R").values,
+      make("--aov light --threads 1 --object " + wall + " --object-color 0.6,0.4,0.2").channel("R").values,
       image.channel("R").values);
   // Fields of 3 units: the lower left and upper right ones are bright.
   const Image checked = make("--checker 2 --object " + wall);
@@ -270,7 +270,7 @@ TEST_F(RenderLayers, MeshesAndLevelSetsAloneAreShadedQuickly) {
     return readImage(folder.file("a.exr"));
   };
   // The same surface, by marching cubes.
-  const Image mesh = make(ball), field = make(levelSet), red = make(ball, "--object-colour 0.5,0,0");
+  const Image mesh = make(ball), field = make(levelSet), red = make(ball, "--object-color 0.5,0,0");
   for (const char* channel : {"R", "G", "B"}) {
     EXPECT_NEAR(mesh.at(channel, 24, 18), field.at(channel, 24, 18), 0.01f);
     EXPECT_GT(mesh.at(channel, 24, 18), 0.1f);
@@ -308,7 +308,7 @@ TEST_F(RenderLayers, ObjectsThatCannotBeAreRefused) {
                {"--object " + bare + " --checker 8", 1, "bare.obj"},
                {"--object " + bare + " --checker -1", 2, "--checker"},
                {"--object " + wall + " --texture " + files.file("none.png"), 1, "none.png"},
-               {"--object " + wall + " --object-colour 2,0,0", 2, "--object-colour"},
+               {"--object " + wall + " --object-color 2,0,0", 2, "--object-color"},
                {"--checker 4", 2, "--object"},
                {"--ground-height 3", 2, "--ground"}};
   for (const auto& c : cases) {

@@ -47,8 +47,8 @@ double mass(const std::string& path) {
 }
 
 TEST_F(WispsVerb, MakesWispsWithoutAnInput) {
-  const ProgramResult result =
-      wisps("w.vdb", kSmall + "--seed 4 --half --density 2 --size-variation 0 --stats " + file("s.json"));
+  const ProgramResult result = wisps(
+      "w.vdb", kSmall + "--seed 4 --half --density 2 --wisp-size-variation 0 --stats " + file("s.json"));
   ASSERT_EQ(result.exitCode, 0) << result.errors;
   EXPECT_NE(result.output.find("12000 dots of 6 guides"), std::string::npos) << result.output;
   const VdbGridInfo info = describe(readScalarGrid(file("w.vdb"), "density"));
@@ -119,7 +119,7 @@ TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
 
 TEST_F(WispsVerb, ScattersGuidesOnAMeshAndInsideIt) {
   const std::string sphere = ownData("data/sphere_uv.obj");
-  const std::string tiny = sphere + " --guides 300 --dots 20 --size 0.001 --resolution 200 --points ";
+  const std::string tiny = sphere + " --guides 300 --dots 20 --wisp-size 0.001 --resolution 200 --points ";
   for (const std::string on : {"surface", "volume", "vertices"}) {
     const ProgramResult result = wisps("w.vdb", tiny + file("dots.ply") + " --on " + on);
     ASSERT_EQ(result.exitCode, 0) << result.errors;
@@ -139,7 +139,8 @@ TEST_F(WispsVerb, ScattersGuidesOnAMeshAndInsideIt) {
 
 TEST_F(WispsVerb, SmearsAlongTheVelocity) {
   const std::string point = pointsFile("p.ply", {"0 0 0"});
-  const std::string options = point + " --size 0.1 --dots 500 --voxel-size 0.02 --dot-radius 0 --density 1 ";
+  const std::string options =
+      point + " --wisp-size 0.1 --dots 500 --voxel-size 0.02 --dot-radius 0 --density 1 ";
   ASSERT_EQ(wisps("still.vdb", options).exitCode, 0);
   ASSERT_EQ(wisps("smeared.vdb", options + "--velocity 2,0,0 --shutter 0,0.5").exitCode, 0);
   const VdbGridInfo still = describe(readScalarGrid(file("still.vdb"))),
@@ -169,14 +170,15 @@ TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {
                     flat = pointsFile("flat.ply", {"0 0 0 1", "1 1 1 0"}, "property float radius\n");
   const std::vector<std::pair<std::string, std::string>> cases{
       {none, "has no points"},
-      {one, "give --size in world units"},
+      {one, "give --wisp-size in world units"},
       {bad, "coordinate y is not finite"},
       {flat, "vertex 1 has the size 0"},
-      {one + " --size 1 --on surface", "has no faces"},
-      {one + " --size 1 --on volume", "has no faces"},
+      {one + " --wisp-size 1 --on surface", "has no faces"},
+      {one + " --wisp-size 1 --on volume", "has no faces"},
       {"/nowhere/p.ply", "/nowhere/p.ply"},
       {"--voxel-size 1e-6", "--voxel-size"},
-      {"--guides 1000000 --dots 100000 --size 1000 --memory-limit 1G --voxel-size 0.01", "use larger voxels"},
+      {"--guides 1000000 --dots 100000 --wisp-size 1000 --memory-limit 1G --voxel-size 0.01",
+       "use larger voxels"},
       {kSmall + "--velocity /nowhere/v.vdb --shutter 0,1", "/nowhere/v.vdb"}};
   for (const auto& [options, said] : cases) {
     const ProgramResult result = wisps("w.vdb", options);
@@ -187,13 +189,36 @@ TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {
 }
 
 TEST_F(WispsVerb, BadOptionsAreUsageErrorsThatNameThem) {
-  for (const std::string bad :
-       {"--guides 0",       "--dots 0",           "--dots -5",      "--size 0",          "--size -1%",
-        "--size nan",       "--size-variation 1", "--density -1",   "--correlation 1.1", "--walk-length 0",
-        "--thickness 2",    "--clump -1",         "--clump 100",    "--amplitude inf",   "--frequency 0",
-        "--octaves 0",      "--displacement -1",  "--resolution 0", "--voxel-size 0",    "--dot-radius -1",
-        "--dot-radius 90%", "--color 1,2",        "--color 2,0,0",  "--velocity 1,2",    "--velocity gale",
-        "--shutter 1,0",    "--shutter 0,1",      "--shape cube",   "--points p.obj",    "--seed -1"}) {
+  for (const std::string bad : {"--guides 0",
+                                "--dots 0",
+                                "--dots -5",
+                                "--wisp-size 0",
+                                "--wisp-size -1%",
+                                "--wisp-size nan",
+                                "--wisp-size-variation 1",
+                                "--density -1",
+                                "--correlation 1.1",
+                                "--walk-length 0",
+                                "--thickness 2",
+                                "--clump -1",
+                                "--clump 100",
+                                "--amplitude inf",
+                                "--frequency 0",
+                                "--octaves 0",
+                                "--displacement -1",
+                                "--resolution 0",
+                                "--voxel-size 0",
+                                "--dot-radius -1",
+                                "--dot-radius 90%",
+                                "--color 1,2",
+                                "--color 2,0,0",
+                                "--velocity 1,2",
+                                "--velocity gale",
+                                "--shutter 1,0",
+                                "--shutter 0,1",
+                                "--shape cube",
+                                "--points p.obj",
+                                "--seed -1"}) {
     const ProgramResult result = wisps("w.vdb", bad);
     EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;
     EXPECT_NE(result.errors.find(bad.substr(0, bad.find(' '))), std::string::npos) << result.errors;
