@@ -1,6 +1,8 @@
 #include "apps/options/descriptions.h"
 
 #include <CLI/App.hpp>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -25,6 +27,27 @@ Description list(const auto& p) {
   return {p.x, p.y, p.z};
 }
 
+/// The least and the greatest of each component, and how many are not finite.
+void addRange(const MeshAttribute& attribute, Description& d) {
+  const auto width = std::size_t(std::max(attribute.width, 1));
+  std::vector<float> least(width, std::numeric_limits<float>::infinity()), most(width, -least[0]);
+  std::size_t notFinite = 0;
+  for (std::size_t i = 0; i < attribute.values.size(); ++i) {
+    const float value = attribute.values[i];
+    if (!std::isfinite(value)) {
+      ++notFinite;
+      continue;
+    }
+    least[i % width] = std::min(least[i % width], value);
+    most[i % width] = std::max(most[i % width], value);
+  }
+  if (std::ranges::all_of(least, [](float value) { return std::isfinite(value); })) {
+    d["least"] = least;
+    d["greatest"] = most;
+  }
+  if (notFinite > 0) d["values_not_finite"] = notFinite;
+}
+
 Description meshDescription(const std::string& path, bool alwaysCountPairs) {
   const Mesh mesh = readMesh(path);
   const MeshDiagnosis is = diagnose(mesh);
@@ -45,6 +68,7 @@ Description meshDescription(const std::string& path, bool alwaysCountPairs) {
   for (const MeshAttribute& a : mesh.attributes) {
     const char* domain = a.domain == MeshAttribute::Domain::corner ? "corner" : "vertex";
     d["attributes"].push_back({{"name", a.name}, {"width", a.width}, {"domain", domain}});
+    addRange(a, d["attributes"].back());
   }
   for (const MeshGroup& g : mesh.groups) d["groups"].push_back({{"name", g.name}, {"faces", g.faceCount}});
   d["merged_vertices"] = is.mergedVertices;

@@ -47,7 +47,23 @@ TEST_F(Info, DescribesAMeshInWordsAndAsJson) {
   EXPECT_DOUBLE_EQ(info["area"].get<double>(), 1.5 + std::sqrt(3.0) / 2);
   EXPECT_EQ(info["attributes"][0]["name"], "uv");
   EXPECT_EQ(info["attributes"][0]["width"], 2);
+  EXPECT_EQ(info["attributes"][0]["least"].size(), 2u);
   EXPECT_EQ(info["groups"][0]["faces"], 4);
+}
+
+TEST_F(Info, ShowsTheRangesOfAttributes) {
+  const std::string path =
+      write("painted.ply",
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+            "property float z\nproperty float growth\nelement face 1\n"
+            "property list uchar int vertex_indices\nend_header\n"
+            "0 0 0 -0.5\n1 0 0 0.25\n0 1 0 2\n3 0 1 2\n");
+  const ProgramResult result = runProgram("info " + path + " --stats " + folder_.file("stats.json"));
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  const nlohmann::json growth = stats()["files"][0]["attributes"][0];
+  EXPECT_EQ(growth["name"], "growth");
+  EXPECT_EQ(growth["least"], nlohmann::json::array({-0.5}));
+  EXPECT_EQ(growth["greatest"], nlohmann::json::array({2.0}));
 }
 
 TEST_F(Info, ShowsNamesThatAreNotUtf8) {
