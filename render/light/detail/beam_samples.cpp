@@ -23,7 +23,7 @@ constexpr float kDarkDepth = 12;
 // Samples along a cell, none of them at a voxel, where they would see none of what is between. Where cells
 // are wide a sample between eight voxels stands for these.
 int samplesAlong(const LatticePlacement& place) {
-  return place.cellsPerBrick == 1 ? 4 : place.cellsPerBrick == 4 ? 3 : 2;
+  return place.cellsPerBrick == 1 || place.cellsPerBrick == 4 ? 3 : 2;
 }
 
 // Voxels from one sample to the next.
