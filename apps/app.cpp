@@ -12,6 +12,7 @@
 #include <span>
 
 #include "apps/detail/program_run.h"
+#include "apps/looks.h"
 #include "apps/options/common_group.h"
 #include "apps/options/config_file.h"
 #include "apps/options/first_day.h"
@@ -52,6 +53,11 @@ void addCommonOptions(CLI::App& app, CommonOptions& options) {
   app.add_flag("--verbose", options.verbose, "Print the time of every stage.")->group(group);
   app.add_option("--config", options.config, "Read options by name from a TOML file; the command line wins.")
       ->type_name("FILE")
+      ->group(group);
+  app.add_option("--look", options.look,
+                 fmt::format("Options that go together, by name: {}. The command line and --config win.",
+                             fmt::join(lookNames(), ", ")))
+      ->type_name("NAME")
       ->group(group);
   markOutput(app.add_option("--stats", options.stats, "Write statistics as one JSON object."))
       ->type_name("FILE")
@@ -148,7 +154,8 @@ std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments
   return arguments;
 }
 
-int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::string& commandLine) {
+int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector<std::string> arguments,
+            const std::string& commandLine) {
   CLI::App app(verb.summary, "nephele " + verb.name);
   app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
   app.set_help_flag("-h,--help", "Print the options of the first day and exit.");
@@ -167,7 +174,7 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments, const std::str
     };
     arguments = withCurrentNames(verb.name, withFilesAfterDashes(std::move(arguments)), note);
     const std::size_t typed = arguments.size();
-    arguments = withConfigFile(app, verb.name, std::move(arguments));
+    arguments = withConfigFile({app, verb.name, verbs}, std::move(arguments));
     const std::string configOptions = joined(std::span(arguments).subspan(typed));
     for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
     std::reverse(arguments.begin(), arguments.end());
@@ -234,9 +241,11 @@ int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
     std::cout << "nephele " << NEPHELE_VERSION << '\n';
     return 0;
   }
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs) names.push_back(verb.name);
   for (const Verb& verb : verbs)
     if (verb.name == word)
-      return runVerb(verb, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
+      return runVerb(verb, names, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
   return unknownVerb(word, verbs);
 }
 

@@ -15,7 +15,7 @@ struct CommonOptions {
   bool quiet = false;
   bool verbose = false;
   bool overwrite = true;
-  std::string config;
+  std::string config, look;
   std::string stats;
   std::string progress = "auto";
   std::string memoryLimit = "80%";
