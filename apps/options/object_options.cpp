@@ -35,6 +35,7 @@ std::vector<SurfaceObject> painted(const ObjectOptions& options, const std::vect
                                                    options.texture, options.textureEncoding, mostBytes));
   for (const std::string& path : paths) {
     SurfaceObject object{readObject(path), options.colour.value_or(colour), options.checkers, image};
+    if (object.mesh.faceCount() == 0) throw Error(path + ": has no surface");
     if ((options.checkers > 0 || image) && !hasCoordinates(object.mesh))
       throw Error(fmt::format("{}: has no texture coordinates, which --{} needs", path,
                               image ? "texture" : "checker"));

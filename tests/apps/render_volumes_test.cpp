@@ -15,10 +15,13 @@ namespace nephele::test {
 namespace {
 
 TEST(RenderData, RefusesALevelSetAndSaysWhatMakesADensityOfIt) {
-  const std::string path = sharedData("volumes/cube_levelset.vdb");
+  // Beside a density; alone it is shaded as a surface.
+  const std::string path = sharedData("volumes/cube_levelset.vdb"),
+                    fog = sharedData("volumes/dragon_small_fog.vdb");
   NEPHELE_REQUIRE_SHARED_DATA(path);
+  NEPHELE_REQUIRE_SHARED_DATA(fog);
   const TemporaryFolder folder;
-  const ProgramResult result = runProgram("render " + path + " -o " + folder.file("a.exr"));
+  const ProgramResult result = runProgram("render " + fog + " " + path + " -o " + folder.file("a.exr"));
   EXPECT_EQ(result.exitCode, 1);
   EXPECT_NE(result.errors.find("level set"), std::string::npos) << result.errors;
   EXPECT_NE(result.errors.find("nephele cloud"), std::string::npos) << result.errors;
@@ -90,7 +93,7 @@ TEST(RenderBadInput, IsRefusedByNameAndReason) {
                {0, set(1e30f), "expected values up to 1e+18"},
                {0.5f, [](FloatGrid&) {}, "expected 0 outside of the volume, but its background is 0.5"},
                {-1, [](FloatGrid&) {}, "its background is -1"},
-               {0, [](FloatGrid& grid) { grid.setGridClass(openvdb::GRID_LEVEL_SET); }, "is a level set"},
+               {0, [](FloatGrid& grid) { grid.setGridClass(openvdb::GRID_LEVEL_SET); }, "has no surface"},
                {0,
                 [](FloatGrid& grid) {
                   grid.transform().postTranslate({1e9, 0, 0});
