@@ -227,10 +227,12 @@ std::string overview(const std::vector<Verb>& verbs) {
 int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   installSignalHandlers();
   const std::string word = argc > 1 ? argv[1] : "--help";
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs) names.push_back(verb.name);
   if (word == "help" && argc > 2) {
     const std::string asked = argv[2];
     for (const Verb& verb : verbs)
-      if (verb.name == asked) return runVerb(verb, {"--help"}, commandLineOf(argc, argv));
+      if (verb.name == asked) return runVerb(verb, names, {"--help"}, commandLineOf(argc, argv));
     return unknownVerb(asked, verbs);
   }
   if (word == "--help" || word == "-h" || word == "help") {
@@ -241,8 +243,6 @@ int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
     std::cout << "nephele " << NEPHELE_VERSION << '\n';
     return 0;
   }
-  std::vector<std::string> names;
-  for (const Verb& verb : verbs) names.push_back(verb.name);
   for (const Verb& verb : verbs)
     if (verb.name == word)
       return runVerb(verb, names, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));

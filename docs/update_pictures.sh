@@ -66,6 +66,16 @@ if picture clear_sky; then
   padding="" tiles clear_sky.jpg 3x2 $files
 fi
 
+if picture looks; then
+  files=
+  for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion; do
+    grow "look_$look.vdb" cloud --look "$look" --resolution 224
+    show "look_$look" "look_$look.vdb" --look "$look" --size 480x270
+    files="$files look_$look.png"
+  done
+  padding="" tiles looks.jpg 3x3 $files
+fi
+
 if picture bunny; then
   grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
   show bunny bunny.vdb --size 960x720

@@ -93,9 +93,6 @@ void addLocal(const MarchScene& scene, const MarchRay& ray, std::size_t index, f
 
 // One step; false once the ray is as good as opaque.
 bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds, MarchResult& result) {
-  std::size_t cursor = 0;
-  const float seen =
-      ray.holdout.transmittance((ray.start + s + (0.5f - ray.jitter) * ds) * ray.cosine, cursor);
   const auto at = [s](const LatticeRay& line) { return line.origin + line.direction * s; };
   ++result.samples;
   const float density =
@@ -103,6 +100,11 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
   if (density == 0 && !scene.emission.table) return true;
   const float depthBefore = result.opticalDepth;
   result.opticalDepth += scene.extinction * density * ds;
+  std::size_t cursor = 0;
+  const float begin = ray.start + s - ray.jitter * ds;
+  const float seen = ray.holdout.empty() ? 1.0f
+                                         : ray.holdout.seen(begin * ray.cosine, (begin + ds) * ray.cosine,
+                                                            scene.extinction * density * ds, cursor);
   const auto through = [&](float depth, int c) {
     return std::exp(-std::min(depth * scene.extinctionColour[c], 80.0f));
   };

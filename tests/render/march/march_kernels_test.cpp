@@ -78,6 +78,25 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   }
 }
 
+TEST(HoldoutCurve, SeesItsShareOfAMediumInTheSamePlace) {
+  // Optical depth m over [2, 4], and a medium of depth n in the same place: of what both stop, 1 - exp(-m -
+  // n), the medium's share is n / (m + n), and all of its own opacity is 1 - exp(-n).
+  for (const float m : {0.01f, 0.7f, 5.0f})
+    for (const float n : {0.02f, 1.0f, 6.0f}) {
+      const HoldoutCurve::Knot knots[] = {{2, 0}, {4, m}};
+      std::size_t cursor = 0;
+      const float expected = n / (m + n) * (1 - std::exp(-m - n)) / (1 - std::exp(-n));
+      EXPECT_NEAR(HoldoutCurve({knots, 2}).seen(2, 4, n, cursor), expected, 2e-5f) << m << " " << n;
+      cursor = 0;
+      // A quarter of it in front, the rest as above with three quarters of the medium behind that.
+      const float front = 1 - std::exp(-n / 4), k = 0.75f * n,
+                  rest = std::exp(-n / 4) * k / (m + k) * (1 - std::exp(-m - k));
+      EXPECT_NEAR(HoldoutCurve({knots, 2}).seen(4.0f / 3, 4, n, cursor), (front + rest) / (1 - std::exp(-n)),
+                  2e-5f)
+          << m << " " << n;
+    }
+}
+
 TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
   const auto grid = test::ball(1.0f, 0.1f);
   const RenderVolume volume(grid);
