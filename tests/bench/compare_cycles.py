@@ -170,7 +170,7 @@ def single(options):
     once = ["--octaves", "1"]
     scene = Scene(options, volume=options.fog, voxel=10 / 3, size=[240, 180], camera=[-11.7, 72.0, 900.0], target=[-11.7, 71.7, -45.0],
                   fov=32.0, sun=[68.0, 33.0], irradiance=3.6, sky=[0.0, 0.0, 0.0], extinction=0.3, albedo=0.99, g=0.3, bounces=0)
-    paths = [scene.ours(f"paths_{seed}", ["--integrator", "path", "--scatterings", "1", "--spp", "1024", "--seed", str(seed)], 1)[0]
+    paths = [scene.ours(f"paths_{seed}", ["--integrator", "path", "--scatterings", "1", "--samples", "1024", "--seed", str(seed)], 1)[0]
              for seed in (1, 2)]
     converged = [scene.cycles(f"cycles_converged_{seed}", samples=64, step_rate=0.25, seed=seed)[0] for seed in (1, 2)]
     ours_reference, cycles_reference = Reference(*paths), Reference(*converged)
@@ -245,7 +245,7 @@ def bunny(options):
         inner = sum(p[2] for p in passes)
         whole = inner + min(p[1] - p[2] for p in passes)
         ours, *seconds = scene.ours(f"bunny_{billow}_ours", [], 3)
-        paths = scene.ours(f"bunny_{billow}_paths", ["--integrator", "path", "--spp", "16"], 1)[0]
+        paths = scene.ours(f"bunny_{billow}_paths", ["--integrator", "path", "--samples", "16"], 1)[0]
         noise = Plane(theirs).noise(0.3)
         print(f"Billow {billow}, 560x420, {options.threads} threads. Cycles, 16 bounces, {per_pass * len(passes)} samples: {whole:.1f} s, "
               f"{inner:.1f} s without start, noise {100 * noise:.1f} % where it is lit. nephele: {seconds[0]:.2f} s, {seconds[1]:.2f} s "

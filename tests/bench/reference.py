@@ -134,7 +134,7 @@ def trace(options, scene):
     for part in range(options.parts or scene.parts):
         name = f"parts/{scene.name}_{part}"
         if not os.path.exists(inside(options, name + ".exr")):
-            render(options, scene, name, ["--integrator", "path", "--spp", str(PART), "--seed", str(1 + part)])
+            render(options, scene, name, ["--integrator", "path", "--samples", str(PART), "--seed", str(1 + part)])
             print(name, load(inside(options, name + ".json")), flush=True)
 
 
@@ -146,7 +146,7 @@ def march(options, scene):
         render(options, scene, f"march/{scene.name}_{quality}", ["--quality", quality], options.runs)
     name = f"parts/{scene.name}_short"
     if not os.path.exists(inside(options, name + ".exr")):
-        render(options, scene, name, ["--integrator", "path", "--spp", "16", "--seed", "1000"])
+        render(options, scene, name, ["--integrator", "path", "--samples", "16", "--seed", "1000"])
 
 
 def camera_of(picture):

@@ -77,7 +77,7 @@ void runVerbs(const Input& input) {
       break;
     case 3:
       runVerb({"render", ballFog(), path, "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1",
-               "--aov", "none", "--integrator", "path", "--spp", "1"},
+               "--aov", "none", "--integrator", "path"},
               path);
       break;
     case 4:
