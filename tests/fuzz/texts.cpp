@@ -69,7 +69,12 @@ void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
   CLI::App app(verb.summary, verb.name);
   verb.bind(app);
   app.allow_extras();
-  arguments = apps::withConfigFile(app, std::move(arguments));
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const apps::Verb& each : verbs()) all.push_back(each.name);
+    return all;
+  }();
+  arguments = apps::withConfigFile({app, verb.name, names}, std::move(arguments));
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
 }
