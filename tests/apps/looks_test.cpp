@@ -21,7 +21,8 @@ TEST(Looks, GrowAndShowTheirClouds) {
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
     const std::string look = file.path().stem().string();
     const TemporaryFolder made;
-    const std::string volume = made.file("a.vdb"), verb = look == "wisps" ? "wisps --dots 20000" : "cloud --layers 1";
+    const std::string volume = made.file("a.vdb"),
+                      verb = look == "wisps" ? "wisps --dots 20000" : "cloud --layers 1";
     const ProgramResult grown =
         runProgram(verb + " --look " + look + " --resolution 24 --quiet -o " + volume);
     ASSERT_EQ(grown.exitCode, 0) << look << ": " << grown.errors;
