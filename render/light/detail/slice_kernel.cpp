@@ -5,7 +5,7 @@
 #include <hwy/highway.h>
 
 #include "nephele/render/light/detail/light_sweep.h"
-#include "nephele/render/light/exp_of_minus.h"
+#include "nephele/render/light/exp_of_minus_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
@@ -30,21 +30,6 @@ struct Shares {
   RowFloats taken, mean, takenSlope, meanSlope;
 };
 
-// detail::expOfMinus for vectors.
-HWY_INLINE RowFloats expOfMinus(RowFloats x) {
-  const RowLanes d;
-  const hn::RebindToSigned<RowLanes> i;
-  constexpr auto& kPower = detail::kPowerOfTwo;
-  const RowFloats y = hn::Mul(x, hn::Set(d, detail::kPerMinusLog2)), middle = hn::Set(d, detail::kRounding);
-  const RowFloats whole = hn::Add(y, middle), f = hn::Sub(y, hn::Sub(whole, middle)), f2 = hn::Mul(f, f);
-  const auto line = [&](float slope, float at0)
-                        HWY_ATTR { return hn::MulAdd(f, hn::Set(d, slope), hn::Set(d, at0)); };
-  const RowFloats high = hn::MulAdd(hn::MulAdd(f2, hn::Set(d, kPower[5]), line(kPower[4], kPower[3])), f2,
-                                    line(kPower[2], kPower[1]));
-  const RowFloats power = hn::MulAdd(high, f2, line(kPower[0], 1.0f));
-  return hn::BitCast(d, hn::Add(hn::BitCast(i, power), hn::ShiftLeft<23>(hn::BitCast(i, whole))));
-}
-
 // By their series where differences would lose their digits.
 HWY_INLINE Shares sharesOf(RowFloats depth) {
   const RowLanes d;
@@ -52,8 +37,8 @@ HWY_INLINE Shares sharesOf(RowFloats depth) {
                         HWY_ATTR { return hn::MulAdd(depth, hn::Set(d, slope), hn::Set(d, at0)); };
   const RowFloats one = hn::Set(d, 1.0f), thin = hn::NegMulAdd(depth, line(0.5f, -1.0f / 6), one),
                   per = hn::Div(one, hn::Max(depth, hn::Set(d, 0.03f)));
-  const RowFloats mean =
-      hn::IfThenElse(hn::Lt(depth, hn::Set(d, 0.03f)), thin, hn::Mul(hn::Sub(one, expOfMinus(depth)), per));
+  const RowFloats mean = hn::IfThenElse(hn::Lt(depth, hn::Set(d, 0.03f)), thin,
+                                        hn::Mul(hn::Sub(one, expOfMinus(d, depth)), per));
   const RowFloats taken = hn::Mul(depth, mean), thinSlope = hn::Mul(depth, line(1.0f / 12, -1.0f / 24));
   const auto isThin = hn::Lt(depth, hn::Set(d, 0.1f));
   const RowFloats slope = hn::NegMulAdd(hn::Set(d, 0.5f), taken, hn::Sub(one, mean));
