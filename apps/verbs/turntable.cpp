@@ -79,7 +79,6 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   if (options.skipExisting) skipExisting(plan, start, run);
   makeFrames(plan, options, picture, volume, start, run);
   makeMovieAndSheet(plan, options, picture, run);
-
   for (const TurntableFrame& frame : plan.frames)
     run.stats["frames"].push_back(
         {{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}});
