@@ -327,9 +327,28 @@ bool LightOptions::readsCodes() const {
          writtenShadows.empty();
 }
 
-Lights LightOptions::resolved(double mostBytes) const {
-  // Of a clear sky: enough for a backdrop that is interpolated.
+// The sky of the first sun, and the light that it leaves of those suns that have none of their own.
+void LightOptions::setClearSky(const std::vector<std::size_t>& ofTheSky, Lights& result) const {
+  // Enough for a backdrop that is interpolated.
   constexpr int kRows = 96;
+  const auto skyOf = [&](const Vec3f& sun) {
+    ClearSky::Options options;
+    options.sun = sun;
+    options.turbidity = *turbidity;
+    options.groundAlbedo = groundAlbedo;
+    return ClearSky(options);
+  };
+  const ClearSky first = skyOf(result.suns.empty() ? defaultSun().direction : result.suns.front().direction);
+  for (const std::size_t i : ofTheSky) {
+    DistantLight& sun = result.suns[i];
+    sun.irradiance = i == 0 ? first.sunlight() : skyOf(sun.direction).sunlight();
+  }
+  result.map = std::make_shared<const Environment>(
+      first.map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
+  result.sky = {};
+}
+
+Lights LightOptions::resolved(double mostBytes) const {
   Lights result = lights;
   std::vector<std::size_t> ofTheSky = sunsOfTheSky;
   if (noSun) {
@@ -357,19 +376,7 @@ Lights LightOptions::resolved(double mostBytes) const {
     const auto map = std::make_shared<const DeepShadowMap>(DeepShadowMap::read(file));
     forLights("--read-deep-shadow", name, result, [&](auto& light) { light.deepShadow = map; });
   }
-  if (turbidity) {
-    ClearSky::Options clear;
-    clear.turbidity = *turbidity;
-    clear.groundAlbedo = groundAlbedo;
-    for (const std::size_t sun : ofTheSky) {
-      clear.sun = result.suns[sun].direction;
-      result.suns[sun].irradiance = ClearSky(clear).sunlight();
-    }
-    clear.sun = result.suns.empty() ? defaultSun().direction : result.suns.front().direction;
-    result.map = std::make_shared<const Environment>(
-        ClearSky(clear).map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
-    result.sky = {};
-  }
+  if (turbidity) setClearSky(ofTheSky, result);
   if (!skyFile.empty()) {
     result.map = std::make_shared<const Environment>(Environment::read(skyFile, sky, mostBytes));
     result.sky = {};

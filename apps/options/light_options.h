@@ -47,6 +47,9 @@ struct LightOptions {
   /// Writes the deep shadow maps that are asked for. @throws Error naming the light or the file.
   void writeShadows(const RenderVolume& volume, const Lights& resolved, const Medium& medium,
                     const Run& run) const;
+
+ private:
+  void setClearSky(const std::vector<std::size_t>& ofTheSky, Lights& result) const;
 };
 
 /// Declares the options of lights on `app`.

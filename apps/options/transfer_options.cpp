@@ -6,6 +6,9 @@
 
 #include "apps/options/colour_options.h"
 #include "apps/options/mesh_options.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
@@ -111,6 +114,23 @@ TextureBakeOptions TransferArguments::bakeOptions(const Image& image) const {
     options.height = image.height;
   }
   return options;
+}
+
+Mesh readShape(const std::string& path, const Run& run) {
+  Mesh mesh = readMesh(path);
+  const MeshDiagnosis is = diagnose(mesh);
+  if (!is.closed()) run.note(path + ": is not closed: only its surface and its outside are mapped");
+  if (is.inward()) run.note(path + ": is inside out, taken the right way round");
+  return mesh;
+}
+
+void TransferArguments::requirePictureMemory(const TextureBakeOptions& baked, const Run& run) const {
+  if (!bakedTexture.empty())
+    run.requireMemory(estimateBakeBytes(baked.width, baked.height),
+                      "make the baked texture smaller (--bake-size)");
+  if (!preview.empty())
+    run.requireMemory(estimateSurfacePictureBytes(picture.width, picture.height),
+                      "make the preview smaller (--size)");
 }
 
 void addTransferOptions(CLI::App& app, TransferArguments& a) {

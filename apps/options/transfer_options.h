@@ -36,7 +36,12 @@ struct TransferArguments {
   TransferOptions chosen(const Mesh& reference, const Mesh& object, const Run& run) const;
   /// `bake` with its size filled in.
   TextureBakeOptions bakeOptions(const Image& image) const;
+  /// Refuses pictures that need too much memory. @throws Error naming the option to change.
+  void requirePictureMemory(const TextureBakeOptions& baked, const Run& run) const;
 };
+
+/// One of the two meshes; says what is wrong with it. @throws Error naming the file.
+Mesh readShape(const std::string& path, const Run& run);
 
 /// Declares the options on `app`.
 void addTransferOptions(CLI::App& app, TransferArguments& arguments);

@@ -39,15 +39,15 @@ void addTransformOptions(CLI::App& app, TransformOptions& options) {
   addVec3(app, "--move", options.move, "Moves it at last, in units of the output.");
 }
 
-Similarity TransformOptions::turned() const {
+Similarity TransformOptions::turn() const {
   Similarity result;
   result.scale = kMetres[int(unit)] / kMetres[int(newUnit)] * scale;
   if (from != to) result = Similarity::rotation({from == UpAxis::z ? -90.0 : 90.0, 0, 0}) * result;
   return Similarity::rotation(Vec3d(degrees)) * result;
 }
 
-Similarity TransformOptions::placed(const Similarity& turn, const Box& box) const {
-  Similarity result = turn;
+Similarity TransformOptions::shift(const Box& box) const {
+  Similarity result;
   if (place != Place::asIs && !box.isEmpty()) {
     result.shift -= Vec3d(box.center());
     if (place == Place::ground) result.shift.y += double(box.center().y - box.min.y);

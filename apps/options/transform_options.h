@@ -3,8 +3,8 @@
 #include <string>
 
 #include "apps/app.h"
-#include "nephele/levelset/mesh/similarity.h"
 #include "nephele/modeling/base/box.h"
+#include "nephele/modeling/base/similarity.h"
 
 namespace nephele::apps {
 
@@ -21,11 +21,10 @@ struct TransformOptions {
   Vec3f degrees{}, move{};
   Place place = Place::asIs;
 
-  bool isPlaced() const { return place != Place::asIs; }
   /// Units, up axis, scale and turn.
-  Similarity turned() const;
-  /// All of it; `box` is that of what was `turned`.
-  Similarity placed(const Similarity& turn, const Box& box) const;
+  Similarity turn() const;
+  /// The way from there to its place; `box` is that of what was turned.
+  Similarity shift(const Box& box) const;
 };
 
 /// Declares the options on `app`.

@@ -9,24 +9,14 @@
 #include "nephele/levelset/flow/advection_files.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
-#include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/warp/warp_grid.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
-#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
-
-Mesh readShape(const std::string& path, Run& run) {
-  Mesh mesh = readMesh(path);
-  const MeshDiagnosis is = diagnose(mesh);
-  if (!is.closed()) run.note(path + ": is not closed: only its surface and its outside are mapped");
-  if (is.inward()) run.note(path + ": is inside out, taken the right way round");
-  return mesh;
-}
 
 /// The map in space, which grids of the distances make fast enough for millions of voxels.
 void writeWarp(const TransferArguments& arguments, const Mesh& reference, const Mesh& object,
@@ -54,16 +44,6 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
   writeMesh(arguments.warpedMesh, mesh);
 }
 
-void requirePictureMemory(const TransferArguments& arguments, const TextureBakeOptions& bake,
-                          const Run& run) {
-  if (!arguments.bakedTexture.empty())
-    run.requireMemory(estimateBakeBytes(bake.width, bake.height),
-                      "make the baked texture smaller (--bake-size)");
-  if (!arguments.preview.empty())
-    run.requireMemory(estimateSurfacePictureBytes(arguments.picture.width, arguments.picture.height),
-                      "make the preview smaller (--size)");
-}
-
 void transfer(const TransferArguments& arguments, Run& run) {
   run.begin("read");
   const Mesh reference = readShape(arguments.from, run);
@@ -74,7 +54,7 @@ void transfer(const TransferArguments& arguments, Run& run) {
                            : std::make_shared<const Image>(readLinearImage(
                                  arguments.texture, arguments.textureEncoding, run.memoryLimitBytes));
   const TextureBakeOptions bakeOptions = texture ? arguments.bakeOptions(*texture) : TextureBakeOptions{};
-  requirePictureMemory(arguments, bakeOptions, run);
+  arguments.requirePictureMemory(bakeOptions, run);
 
   MeshWarpOptions warpOptions = arguments.warp;
   warpOptions.voxelSize = double(boundingBox(reference).longestSide()) / arguments.resolution;

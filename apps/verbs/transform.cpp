@@ -7,23 +7,24 @@ namespace nephele::apps {
 namespace {
 
 void moveMesh(const TransformOptions& options, Run& run) {
-  const Mesh mesh = readMesh(options.input);
-  const Similarity turn = options.turned();
-  const Mesh result = namingFile(
-      options.input, [&] { return moved(mesh, options.placed(turn, boundingBox(moved(mesh, turn)))); });
+  const Mesh result = namingFile(options.input, [&] {
+    Mesh turned = moved(readMesh(options.input), options.turn());
+    const Similarity shift = options.shift(boundingBox(turned));
+    return moved(std::move(turned), shift);
+  });
   run.begin("write");
   writeMesh(options.output, result);
 }
 
 void moveVolume(const TransformOptions& options, Run& run) {
   std::vector<VdbGrid> grids = readVdbFile(options.input);
-  const Similarity turn = options.turned();
   namingFile(options.input, [&] {
     Box box;
-    for (const VdbGrid& grid : grids)
-      if (options.isPlaced()) box = box.including(activeBox(moved(grid, turn)));
-    const Similarity to = options.placed(turn, box);
-    for (VdbGrid& grid : grids) grid = moved(grid, to);
+    for (VdbGrid& grid : grids) {
+      grid = moved(grid, options.turn());
+      box = box.including(activeBox(grid));
+    }
+    for (VdbGrid& grid : grids) grid = moved(grid, options.shift(box));
   });
   run.begin("write");
   writeVdbFile(options.output, grids, run.metadata());

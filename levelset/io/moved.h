@@ -1,7 +1,7 @@
 #pragma once
 
 #include "nephele/levelset/io/vdb_io.h"
-#include "nephele/levelset/mesh/similarity.h"
+#include "nephele/modeling/base/similarity.h"
 
 namespace nephele {
 

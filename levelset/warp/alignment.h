@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "nephele/levelset/mesh/exact_distance.h"
-#include "nephele/levelset/mesh/similarity.h"
 #include "nephele/modeling/base/progress.h"
+#include "nephele/modeling/base/similarity.h"
 
 namespace nephele {
 

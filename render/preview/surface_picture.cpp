@@ -90,8 +90,7 @@ struct Scene {
     while (count < samples && !(sums.isOpen && count == kOpenSamples)) {
       ++count;
       for (std::size_t d = 0; d < 6; ++d) u[d] = fraction(shift[d] + kStep[d] * count);
-      add(camera.ray(double(x) + u[0], double(y) + u[1]), u, count % kPerLook == 1 || samples < kPerLook,
-          sums);
+      add(camera.ray(double(x) + u[0], double(y) + u[1]), u, count % kPerLook == 1, sums);
     }
     Seen& seen = sums.seen;
     const float perRay = 1 / float(count), perPlace = sums.places > 0 ? 1 / float(sums.places) : 0.0f,

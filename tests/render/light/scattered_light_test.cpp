@@ -153,6 +153,17 @@ TEST(ScatteredLight, EndsWithinItsTolerance) {
     EXPECT_NEAR(light.meanAt(p) / limit.meanAt(p), 1, 0.025) << p.x;
 }
 
+TEST(ScatteredLight, TakesFinerCellsWhereTheyAreDeep) {
+  // A ball of density 2, 34 voxels wide, on cells that are half a voxel wide at most: of an optical depth of
+  // 0.06 times the extinction.
+  const RenderVolume volume(ball(1.0f, 0.06f));
+  const ScatteredLight::Options usual;
+  EXPECT_EQ(usual.finerWhereDeep(volume, scattering(2.0f, 0.9f, 0.0f)).longestSide, usual.longestSide);
+  const int finer = usual.finerWhereDeep(volume, scattering(2000.0f, 0.9f, 0.0f)).longestSide;
+  EXPECT_GT(finer, usual.longestSide);
+  EXPECT_LT(finer, 3 * usual.longestSide / 2);
+}
+
 TEST(ScatteredLight, ConvergesQuicklyWhereForwardScatteringCoversManyCells) {
   const RenderVolume volume(ball(1.0f, 0.06f));
   const LightVolume sun(volume, {1, 1, 0});

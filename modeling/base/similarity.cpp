@@ -1,4 +1,4 @@
-#include "nephele/levelset/mesh/similarity.h"
+#include "nephele/modeling/base/similarity.h"
 
 #include <algorithm>
 #include <cmath>
