@@ -11,12 +11,12 @@
 #include <new>
 #include <span>
 
-#include "apps/detail/program_run.h"
-#include "apps/looks.h"
-#include "apps/options/common_group.h"
+#include "apps/detail/command.h"
+#include "apps/detail/several_calls.h"
 #include "apps/options/config_file.h"
 #include "apps/options/first_day.h"
 #include "apps/options/old_names.h"
+#include "apps/sequence.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
 
@@ -45,35 +45,6 @@ std::string commandLineOf(int argc, char** argv) {
   return "nephele " + joined(std::vector<std::string>(argv + 1, argv + argc));
 }
 
-void addCommonOptions(CLI::App& app, CommonOptions& options) {
-  const std::string group = kCommonGroup;
-  addCount(app, "--threads", options.threads, 0, 4096, "Threads to use; 0: all that the process may use.")
-      ->group(group);
-  app.add_flag("--quiet", options.quiet, "Print errors only.")->group(group);
-  app.add_flag("--verbose", options.verbose, "Print the time of every stage.")->group(group);
-  app.add_option("--config", options.config, "Read options by name from a TOML file; the command line wins.")
-      ->type_name("FILE")
-      ->group(group);
-  app.add_option("--look", options.look,
-                 fmt::format("Options that go together, by name: {}. The command line and --config win.",
-                             fmt::join(lookNames(), ", ")))
-      ->type_name("NAME")
-      ->group(group);
-  markOutput(app.add_option("--stats", options.stats, "Write statistics as one JSON object."))
-      ->type_name("FILE")
-      ->group(group);
-  app.add_option("--progress", options.progress, "auto, or alf for lines that farm software reads.")
-      ->check(CLI::IsMember({"auto", "alf"}))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--memory-limit", options.memoryLimit,
-                 "Refuse work that needs more: 8G, 512M or a share of memory.")
-      ->capture_default_str()
-      ->group(group);
-  app.add_flag("--overwrite", options.overwrite, "Replace outputs that exist; this is the default.")
-      ->group(group);
-}
-
 void writeStatistics(const std::string& path, const nlohmann::json& statistics) {
   OutputFile output(path);
   OutputStream stream(output);
@@ -81,16 +52,6 @@ void writeStatistics(const std::string& path, const nlohmann::json& statistics) 
   stream.write(statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + '\n');
   stream.close();
   output.commit();
-}
-
-std::vector<std::string> optionNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options())
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  for (const CLI::App* group :
-       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
-    for (const std::string& name : optionNames(*group)) names.push_back(name);
-  return names;
 }
 
 /// One line: what names of files and of what is in them hold beside letters does not reach the terminal.
@@ -104,12 +65,10 @@ int usageError(const std::string& who, const std::string& what) {
   return kUsage;
 }
 
-int runBody(const Verb& verb, CLI::App& app, ProgramRun& run, const CommonOptions& options) {
-  const std::string who = "nephele " + verb.name;
+int runWork(const std::string& who, ProgramRun& run, const CommonOptions& options,
+            const std::function<void()>& work) {
   try {
-    requireDistinctOutputs(app);
-    tryOutputs(app);
-    verb.body(run);
+    work();
     run.finish();
     if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
     require(std::cout.flush().good() && std::fflush(stdout) == 0, "the standard output could not be written");
@@ -134,16 +93,6 @@ int runBody(const Verb& verb, CLI::App& app, ProgramRun& run, const CommonOption
   return kFailed;
 }
 
-/// CLI11 takes "--flag=-1" as an order to switch the flag off.
-void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
-  const std::size_t equals = argument.find('=');
-  if (!argument.starts_with("--") || equals == std::string::npos) return;
-  const std::string name = argument.substr(0, equals);
-  const CLI::Option* option = app.get_option_no_throw(name);
-  if (option && option->get_items_expected_max() == 0)
-    refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
-}
-
 /// After "--" all arguments are files, also where they begin with a dash.
 std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments) {
   const auto mark = std::find(arguments.begin(), arguments.end(), "--");
@@ -154,19 +103,33 @@ std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments
   return arguments;
 }
 
+bool given(const CLI::App& app, const char* name) {
+  const CLI::Option* option = app.get_option_no_throw(name);
+  return option && option->count() > 0;
+}
+
+/// What the command line asks for, with the options of its first call.
+void work(Command& command, const std::optional<Sequence>& sequence, ProgramRun& run) {
+  requireDistinctOutputs(command.app);
+  if (sequence)
+    sequence->check(command.app, run);
+  else
+    refuseFrameNames(command.app);
+  tryOutputs(command.app);
+  for (const char* option : {"--only", "--shard", "--skip-existing"})
+    if (!sequence && !command.hasOwnFrames() && given(command.app, option))
+      throw CLI::ValidationError(option, "is for several calls; give --frames");
+  if (!sequence) return command.bound.body(run);
+  makeCalls(command.verb,
+            {sequence->size(), [&](std::size_t i) { return sequence->call(i); }, sequence->made(),
+             sequence->variesInputs(command.app), "frames", command.options.skipExisting},
+            run);
+}
+
 int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector<std::string> arguments,
             const std::string& commandLine) {
-  CLI::App app(verb.summary, "nephele " + verb.name);
-  app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
-  app.set_help_flag("-h,--help", "Print the options of the first day and exit.");
-  app.set_help_all_flag("--help-all", "Print all options and exit.");
-  app.get_formatter()->column_width(34);
-  // Collected, so that a suggestion can be made for each.
-  app.allow_extras();
-  CommonOptions options;
-  verb.bind(app);
-  addCommonOptions(app, options);
-
+  Command command(verb);
+  const CommonOptions& options = command.options;
   const std::string who = "nephele " + verb.name;
   try {
     const auto note = [&](const std::string& sentence) {
@@ -174,18 +137,10 @@ int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector
     };
     arguments = withCurrentNames(verb.name, withFilesAfterDashes(std::move(arguments)), note);
     const std::size_t typed = arguments.size();
-    arguments = withConfigFile({app, verb.name, verbs}, std::move(arguments));
+    arguments = withConfigFile({command.app, verb.name, verbs}, std::move(arguments));
     const std::string configOptions = joined(std::span(arguments).subspan(typed));
-    for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
-    std::reverse(arguments.begin(), arguments.end());
-    app.parse(std::move(arguments));
-    for (const std::string& extra : app.remaining()) {
-      if (!extra.starts_with('-'))
-        return usageError(who, fmt::format("'{}' is one argument too many", extra));
-      const std::string meant = closestWord(extra.substr(0, extra.find('=')), optionNames(app));
-      return usageError(who, fmt::format("unknown option '{}'{}", extra,
-                                         meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
-    }
+    const std::optional<Sequence> sequence = command.hasOwnFrames() ? std::nullopt : Sequence::of(arguments);
+    command.parse(sequence ? sequence->call(0).arguments : arguments);
     ProgramRun run(verb.name, options);
     run.commandLine = commandLine;
     run.configOptions = configOptions;
@@ -193,15 +148,15 @@ int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector
         options.threads > 0 ? std::size_t(options.threads)
                             : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return runBody(verb, app, run, options);
+    return runWork(who, run, options, [&] { work(command, sequence, run); });
   } catch (const CLI::CallForAllHelp&) {
-    std::cout << app.help();
+    std::cout << command.app.help();
     return 0;
   } catch (const CLI::CallForHelp&) {
-    const int count = showFirstDay(app, verb.name);
-    app.footer("'nephele " + verb.name + " --help-all' shows all " + std::to_string(count) + " options.\n" +
-               app.get_footer());
-    std::cout << app.help();
+    const int count = showFirstDay(command.app, verb.name);
+    command.app.footer("'nephele " + verb.name + " --help-all' shows all " + std::to_string(count) +
+                       " options.\n" + command.app.get_footer());
+    std::cout << command.app.help();
     return 0;
   } catch (const CLI::ParseError& error) {
     return usageError(who, error.what());

@@ -6,10 +6,13 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "apps/extent.h"
 #include "apps/options/options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/progress.h"
@@ -29,7 +32,25 @@ class Run : public Progress {
   /// The options that came from --config, as they would be typed; "" where none did.
   std::string configOptions;
 
-  /// Metadata that every output carries: creator, version, command line, options of a configuration file.
+  /// One of several calls that a command line stands for, by --frames or --wedge.
+  struct Part {
+    /// The frame, and how many come before it in the numbering; nothing in a wedge.
+    std::optional<int> frame{};
+    int framesSinceFirst = 0;
+    /// All inputs together, where they differ: what is chosen from the input is chosen from this.
+    std::optional<Extent> range{};
+    /// Says what this part is made of, for --skip-existing; see kPartDigest.
+    std::string digest{};
+  };
+  std::optional<Part> part;
+
+  /// The longest side of `own`, the box of the input; in a sequence that of its largest frame.
+  double longestSide(const Box& own) const;
+  /// `own`; in a sequence the box around all inputs.
+  Box box(const Box& own) const;
+
+  /// Metadata that every output carries: creator, version, command line, options of a configuration file, and
+  /// of which frame it is.
   std::map<std::string, std::string> metadata() const;
 
   /// Refuses work that needs more than --memory-limit.
@@ -60,30 +81,41 @@ class SeveralErrors : public Error {
   std::vector<std::string> messages_;
 };
 
+/// The metadata that holds Run::Part::digest.
+inline constexpr const char* kPartDigest = "nephele:options";
+
+/// What a verb does with the options that were bound to one command line.
+struct BoundVerb {
+  std::function<void(Run&)> body;
+  /// How large the input is, for sequences; null where nothing is chosen by that.
+  std::function<Extent(Run&)> measure{};
+};
+
 /// One verb of the program.
 struct Verb {
   std::string name;
   std::string summary;
   /// One worked command line, shown by --help.
   std::string example;
-  /// Declares the verb's options, bound to variables that the body shares.
-  std::function<void(CLI::App&)> bind;
-  std::function<void(Run&)> body;
+  /// Declares the verb's options, bound to variables that what it returns works on.
+  std::function<BoundVerb(CLI::App&)> bind;
   /// What --help says between the options and the example.
   std::string notes{};
 };
 
-/// A verb whose body works on the options that were bound.
+/// A verb whose body, and what measures its input, work on the options that were bound.
 template <class Options>
 Verb verbOf(std::string name, std::string summary, std::string example, void (*bind)(CLI::App&, Options&),
-            void (*body)(const Options&, Run&), std::string notes = {}) {
-  const auto options = std::make_shared<Options>();
-  return {std::move(name),
-          std::move(summary),
-          std::move(example),
-          [=](CLI::App& app) { bind(app, *options); },
-          [=](Run& run) { body(*options, run); },
-          std::move(notes)};
+            void (*body)(const Options&, Run&), std::string notes = {},
+            std::type_identity_t<std::function<Extent(const Options&, Run&)>> measure = {}) {
+  const auto bound = [=](CLI::App& app) {
+    const auto options = std::make_shared<Options>();
+    bind(app, *options);
+    BoundVerb verb{[=](Run& run) { body(*options, run); }};
+    if (measure) verb.measure = [=](Run& run) { return measure(*options, run); };
+    return verb;
+  };
+  return {std::move(name), std::move(summary), std::move(example), bound, std::move(notes)};
 }
 
 Verb levelsetVerb();

@@ -74,7 +74,17 @@ std::map<std::string, std::string> Run::metadata() const {
   std::map<std::string, std::string> all{
       {"creator", "nephele"}, {"version", NEPHELE_VERSION}, {"command_line", commandLine}};
   if (!configOptions.empty()) all["config_options"] = configOptions;
+  if (part && part->frame) all["frame"] = std::to_string(*part->frame);
+  if (part && !part->digest.empty()) all[kPartDigest] = part->digest;
   return all;
+}
+
+double Run::longestSide(const Box& own) const {
+  return part && part->range ? part->range->longestSide : double(own.longestSide());
+}
+
+Box Run::box(const Box& own) const {
+  return part && part->range ? part->range->box : own;
 }
 
 void Run::requireMemory(double estimatedBytes, const std::string& remedy) const {
@@ -86,7 +96,7 @@ void Run::requireMemory(double estimatedBytes, const std::string& remedy) const 
 }
 
 ProgramRun::ProgramRun(std::string verb, const CommonOptions& options)
-    : verb_(std::move(verb)), options_(options), terminal_(isatty(STDERR_FILENO) != 0) {
+    : verb_(std::move(verb)), who_(verb_), options_(options), terminal_(isatty(STDERR_FILENO) != 0) {
   memoryLimitBytes = parseMemoryLimit(options.memoryLimit);
 }
 
@@ -112,16 +122,42 @@ void ProgramRun::endStage() const {
   clearBar();
   const bool slow = seconds >= 2;
   if (options_.verbose || (slow && !options_.quiet && !terminal_))
-    say("nephele {}: {}: {:.2f} s\n", verb_, stage_, seconds);
+    say("nephele {}: {}: {:.2f} s\n", who_, stage_, seconds);
   stage_.clear();
 }
 
 void ProgramRun::expect(double from, double to, int stages) const {
   const std::lock_guard lock(mutex_);
-  from_ = from;
-  to_ = to;
+  from_ = partFrom_ + (partTo_ - partFrom_) * from;
+  to_ = partFrom_ + (partTo_ - partFrom_) * to;
   expectedStages_ = stages;
   expectedFrom_ = stages_.size();
+}
+
+void ProgramRun::beginPart(const std::string& name, double from, double to) {
+  {
+    const std::lock_guard lock(mutex_);
+    endStage();
+    stages_.clear();
+    who_ = verb_ + ": " + name;
+    partFrom_ = from;
+    partTo_ = to;
+    partStart_ = Clock::now();
+  }
+  stats = nlohmann::json::object();
+  expect(0, 1, 0);
+}
+
+nlohmann::json ProgramRun::endPart() {
+  const std::lock_guard lock(mutex_);
+  endStage();
+  nlohmann::json result = {{"seconds", std::chrono::duration<double>(Clock::now() - partStart_).count()},
+                           {"stages", stages_}};
+  result.update(stats);
+  stages_.clear();
+  stats = nlohmann::json::object();
+  who_ = verb_;
+  return result;
 }
 
 void ProgramRun::advance(double fraction) const {
@@ -156,13 +192,14 @@ void ProgramRun::draw(double fraction) const {
   if (terminal_) {
     constexpr int kWidth = 30;
     const int filled = int(fraction * kWidth);
-    say("\r\033[K{} [{}{}] {:3.0f} %{}", stage_, std::string(filled, '#'), std::string(kWidth - filled, '.'),
-        fraction * 100, left ? fmt::format("  {:.0f} s left", *left) : "");
+    say("\r\033[K{}{} [{}{}] {:3.0f} %{}", who_ == verb_ ? "" : who_.substr(verb_.size() + 2) + ": ", stage_,
+        std::string(filled, '#'), std::string(kWidth - filled, '.'), fraction * 100,
+        left ? fmt::format("  {:.0f} s left", *left) : "");
     std::fflush(stderr);
     barShown_ = true;
   } else if (const auto now = lastDrawn_.load(); seconds >= 2 && now - lastLine_ >= 5000) {
     lastLine_ = now;
-    say("nephele {}: {}: {:.0f} %{}\n", verb_, stage_, fraction * 100,
+    say("nephele {}: {}: {:.0f} %{}\n", who_, stage_, fraction * 100,
         left ? fmt::format(", {:.0f} s left", *left) : "");
   }
 }
@@ -177,8 +214,10 @@ void ProgramRun::clearBar() const {
 void ProgramRun::note(std::string_view message) const {
   if (options_.quiet) return;
   const std::lock_guard lock(mutex_);
+  // What holds for all parts is said of the first.
+  if (who_ != verb_ && !said_.emplace(message).second) return;
   clearBar();
-  say("nephele {}: {}\n", verb_, printable(message));
+  say("nephele {}: {}\n", who_, printable(message));
 }
 
 void ProgramRun::detail(std::string_view message) const {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <set>
 
 #include "apps/app.h"
 #include "apps/detail/time_left.h"
@@ -15,6 +16,11 @@ struct CommonOptions {
   bool quiet = false;
   bool verbose = false;
   bool overwrite = true;
+  /// Of sequences, which turntables have on their own.
+  std::string frames, only, shard;
+  bool skipExisting = false;
+  std::vector<std::string> wedges;
+  std::string contactSheet;
   std::string config, look;
   std::string stats;
   std::string progress = "auto";
@@ -35,6 +41,12 @@ class ProgramRun : public Run {
   void detail(std::string_view message) const override;
   void result(const std::string& line) const override;
 
+  /// From here on stages and statistics are those of one part of the whole run, which takes the progress from
+  /// the share `from` to `to`. Messages name it.
+  void beginPart(const std::string& name, double from, double to);
+  /// Ends it. Its stages and statistics, with its seconds, which are taken out of this run's.
+  nlohmann::json endPart();
+
   /// Ends the last stage and clears the bar. Call before anything else is printed.
   void finish() const;
 
@@ -48,7 +60,7 @@ class ProgramRun : public Run {
   void draw(double fraction) const;
   void clearBar() const;
 
-  std::string verb_;
+  std::string verb_, who_;
   CommonOptions options_;
   bool terminal_ = false;
   Clock::time_point start_ = Clock::now();
@@ -59,6 +71,9 @@ class ProgramRun : public Run {
   mutable TimeLeft timeLeft_;
   mutable nlohmann::json stages_ = nlohmann::json::array();
   mutable bool barShown_ = false;
+  mutable std::set<std::string> said_;
+  double partFrom_ = 0, partTo_ = 1;
+  Clock::time_point partStart_ = start_;
   mutable double from_ = 0, to_ = 1;
   mutable int expectedStages_ = 0;
   mutable std::size_t expectedFrom_ = 0;  // stages before the expected ones

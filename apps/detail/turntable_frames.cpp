@@ -165,7 +165,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       run.check();
       notFinite += noteNotFinite(frame.path, result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
-      metadata[TurntablePlan::kDigestName] = plan.digest;
+      metadata[kPartDigest] = plan.digest;
       writer.write(frame, std::move(result.image), camera, std::move(metadata));
       if (i + 1 == missing.size()) writer.finish();
       frame.seconds = secondsSince(began);

@@ -4,16 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <filesystem>
-#include <fstream>
+#include <string_view>
 
+#include "apps/options_digest.h"
+#include "apps/sequence.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/image/exr_io.h"
-#include "nephele/render/image/image_file.h"
 
 namespace nephele::apps {
 namespace {
@@ -28,85 +27,22 @@ auto parsed(const std::string& option, const Parse& parse) {
   }
 }
 
-std::vector<int> shardOf(const FrameRange& range, const std::string& text) {
-  int index = 0, count = 0;
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, index);
-  const bool slash = first.ec == std::errc() && first.ptr != end && *first.ptr == '/';
-  const auto second = std::from_chars(slash ? first.ptr + 1 : end, end, count);
-  if (!slash || second.ec != std::errc() || second.ptr != end || index < 1 || count < index)
-    refuseValue("--shard", text, "I/N, machine I of N, with 1 <= I <= N");
-  return range.shard(index, count);
-}
-
-// A 64 bit FNV-1a hash.
-class Hash {
- public:
-  void add(std::string_view bytes) {
-    for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
-    // So that "ab", "c" and "a", "bc" differ.
-    value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
-  }
-  // A file by what it holds, wherever it is.
-  void addFile(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::vector<char> block(std::size_t(1) << 20);
-    while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
-      add({block.data(), std::size_t(file.gcount())});
-  }
-  std::string text() const { return fmt::format("{:016x}", value_); }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325u;
-};
-
-// What the pixels of a frame do not depend on, or only by its number.
-constexpr std::array kOthers{"output",        "frames", "preview",       "movie",      "fps",
-                             "contact-sheet", "only",   "shard",         "exposure",   "view-transform",
-                             "ocio-config",   "config", "skip-existing", "background", "display-server",
-                             "threads",       "quiet",  "verbose",       "stats",      "progress",
-                             "memory-limit",  "help",   "overwrite"};
-
-std::string digestOf(const TurntableOptions& options, int first, int last) {
-  Hash hash;
-  hash.add(NEPHELE_VERSION);
-  hash.add(fmt::format("{}-{}", first, last));
-  for (const CLI::Option* option : options.app->get_options()) {
-    const std::string name = option->get_single_name();
-    if (option->count() == 0 || std::ranges::count(kOthers, name) > 0) continue;
-    hash.add(name);
-    for (const std::string& value : option->results()) {
-      std::error_code ignored;
-      const std::size_t equals = value.find('=');
-      const std::string rest = equals == std::string::npos ? value : value.substr(equals + 1);
-      const bool isFile = std::filesystem::is_regular_file(rest, ignored);
-      hash.add(isFile ? value.substr(0, value.size() - rest.size()) : value);
-      if (isFile) hash.addFile(rest);
-    }
-  }
-  return hash.text();
-}
+// What the linear pixels of a frame do not depend on, or only by its number.
+constexpr std::string_view kOthers[]{"frames",         "fps",         "only",      "shard", "exposure",
+                                     "view-transform", "ocio-config", "background"};
 
 // Why `path` is not a whole picture of the `window` of `camera`; "" if it is. Pictures for the screen say
 // nothing of what they are made of.
 std::string defect(const std::string& path, const PixelBox& window, const std::string& digest) {
   try {
-    std::string found;
-    if (!digest.empty()) {
-      const detail::ImageReader reader{[&](const detail::ImageHeader& header) {
-                                         for (const auto& [name, value] : header.attributes)
-                                           if (name == TurntablePlan::kDigestName) found = value;
-                                       },
-                                       [](int, const float*) {}};
-      detail::readExrFile(path, reader);
-    }
+    const std::string found = digest.empty() ? "" : outputDigest(path);
     const Image image = readImage(path);
     for (const char* name : {"R", "G", "B"})
       if (!image.find(name)) return fmt::format("has no channel {}", name);
     if (image.width != window.width() || image.height != window.height())
       return fmt::format("is {}x{} and not {}x{}", image.width, image.height, window.width(),
                          window.height());
-    return found == digest ? "" : "was made with other options, of another input or by another version";
+    return found == digest ? "" : kOtherDigest;
   } catch (const Error& error) {
     return fmt::format("is not whole ({})", error.what());
   }
@@ -118,7 +54,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
-  digest = digestOf(options, first, last);
+  digest = optionsDigest(*options.app, kOthers, fmt::format("{}-{}", first, last));
   const FramePattern output = parsed("--output", [&] { return FramePattern::parse(options.output); });
   std::optional<FramePattern> preview;
   if (!options.preview.empty())
@@ -132,11 +68,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
                                                "there, call again with --skip-existing and without {}",
                                                other, other));
 
-  std::vector<int> numbers = options.shard.empty() ? range.frames() : shardOf(range, options.shard);
-  if (!options.only.empty()) {
-    const FrameRange only = parsed("--only", [&] { return FrameRange::parse(options.only); });
-    std::erase_if(numbers, [&](int number) { return !only.contains(number); });
-  }
+  const std::vector<int> numbers = chosenFrames(range, options.only, options.shard);
   for (const int number : numbers)
     frames.push_back({number, output.path(number), preview ? preview->path(number) : ""});
   for (const TurntableFrame& frame : frames)

@@ -43,10 +43,9 @@ struct TurntablePlan {
   int first = 0, last = 0;
   std::vector<TurntableFrame> frames;
   /// Says what frames are made of: the options that their pixels depend on, as typed, the contents of the
-  /// files that these name, first and last, and the version of the program. The attribute kDigestName of the
+  /// files that these name, first and last, and the version of the program. The attribute kPartDigest of the
   /// frames.
   std::string digest;
-  static constexpr const char* kDigestName = "nephele:options";
 
   /// @throws CLI::ValidationError naming the option that is wrong.
   explicit TurntablePlan(const TurntableOptions& options);

@@ -119,15 +119,15 @@ void addTime(CLI::App& app, CameraOptions& options) {
       ->type_name("DX,DY,DZ[,RX,RY,RZ]");
 }
 
-Vec3f middleOf(const RenderVolume& volume) {
-  return volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
+Vec3f middleOf(const Extent& seen) {
+  return seen.box.isEmpty() ? Vec3f{} : seen.box.center();
 }
 
-// Of an orthographic picture that shows all of `volume` to a camera like `camera`, with a margin of 4 %.
-float widthFor(const RenderVolume& volume, const Camera& camera) {
+// Of an orthographic picture that shows all that is seen to a camera like `camera`, with a margin of 4 %.
+float widthFor(const Extent& seen, const Camera& camera) {
   double half = 0;
   const double pixels = camera.width() / camera.screenWidth();
-  for (const Vec3f& point : volume.outline()) {
+  for (const Vec3f& point : seen.outline) {
     const Vec3d p = camera.project(Vec3d(point));
     half = std::max({half, std::fabs(p.x - 0.5 * camera.width()) / pixels,
                      std::fabs(p.y - 0.5 * camera.height()) / pixels * camera.width() / camera.height()});
@@ -138,7 +138,7 @@ float widthFor(const RenderVolume& volume, const Camera& camera) {
 // The options and a key of a file, put together.
 class Placement {
  public:
-  Placement(const CameraOptions& options, const RenderVolume& volume) : options_(options), volume_(volume) {}
+  explicit Placement(const CameraOptions& options) : options_(options) {}
 
   Camera camera(const CameraKey& key) {
     const Camera::Frame frame = frameOf(key);
@@ -150,20 +150,18 @@ class Placement {
 
   Camera camera() {
     const Camera::Frame frame = frameOf({});
-    if (!options_.position) {
-      const std::vector<Vec3f>& framed = options_.framed.empty() ? volume_.outline() : options_.framed;
-      return withLens(Camera::framing(framed, options_.view.x, options_.view.y, frame), frame, {});
-    }
+    if (!options_.position)
+      return withLens(Camera::framing(options_.seen.outline, options_.view.x, options_.view.y, frame), frame,
+                      {});
     return withLens(fitted(frame,
                            [&](const Camera::Frame& f) {
                              return Camera::lookingAt(*options_.position,
-                                                      options_.lookAt.value_or(middleOf(volume_)),
+                                                      options_.lookAt.value_or(middleOf(options_.seen)),
                                                       options_.up, f);
                            }),
                     frame, {});
   }
 
- private:
   Camera::Frame frameOf(const CameraKey& key) const {
     Camera::Frame frame = options_.frame;
     if (options_.fovDegrees)
@@ -181,13 +179,16 @@ class Placement {
     return frame;
   }
 
+ private:
   // A camera that does not frame anything needs a width; all of a moving one's poses have the same.
   template <class Make>
   Camera fitted(Camera::Frame frame, const Make& make) {
     const bool parallel = frame.projection == Camera::Projection::orthographic;
     if (parallel && !frame.orthographicWidth) {
+      if (options_.isOneOfMany && !options_.file.empty())
+        throw CLI::ValidationError("--orthographic-width", "a sequence seen by --camera needs one for all");
       frame.orthographicWidth = width_.value_or(1.0f);
-      if (!width_) frame.orthographicWidth = width_ = widthFor(volume_, make(frame));
+      if (!width_) frame.orthographicWidth = width_ = widthFor(options_.seen, make(frame));
     }
     return make(frame);
   }
@@ -204,7 +205,7 @@ class Placement {
     }
     if (radius == 0) return camera;
     const std::optional<double> focus = options_.focusDistance ? options_.focusDistance : key.focusDistance;
-    const double distance = focus ? *focus : camera.project(Vec3d(middleOf(volume_))).z;
+    const double distance = focus ? *focus : camera.project(Vec3d(middleOf(options_.seen))).z;
     if (!(distance > 0))
       throw CLI::ValidationError("--focus-distance",
                                  "the middle of the volume is not in front of the camera, so "
@@ -213,7 +214,6 @@ class Placement {
   }
 
   const CameraOptions& options_;
-  const RenderVolume& volume_;
   std::optional<float> width_;
 };
 
@@ -226,12 +226,32 @@ void addCameraOptions(CLI::App& app, CameraOptions& options) {
   addTime(app, options);
 }
 
-std::optional<Camera> CameraOptions::laterCamera(const RenderVolume& volume, double frames) const {
-  if (file.empty()) return std::nullopt;
-  return camera(volume, frames);
+CameraOptions CameraOptions::placed(const Extent& own, const Run& run) const {
+  CameraOptions result = *this;
+  result.seen = run.part && run.part->range ? *run.part->range : own;
+  result.isOneOfMany = run.part.has_value();
+  if (run.part && run.part->frame && !frameNumber) result.frameNumber = *run.part->frame;
+  return result;
 }
 
-Camera CameraOptions::camera(const RenderVolume& volume, double framesLater) const {
+std::vector<Vec3f> CameraOptions::outermost(const std::vector<Vec3f>& points) const {
+  if (file.empty() && !position)
+    return Camera::outermost(points, view.x, view.y, Placement(*this).frameOf({}));
+  Box box;
+  for (const Vec3f& point : points) box = box.including(point);
+  std::vector<Vec3f> corners;
+  for (int corner = 0; corner < 8 && !box.isEmpty(); ++corner)
+    corners.push_back({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                       corner & 4 ? box.max.z : box.min.z});
+  return corners;
+}
+
+std::optional<Camera> CameraOptions::laterCamera(double frames) const {
+  if (file.empty()) return std::nullopt;
+  return camera(frames);
+}
+
+Camera CameraOptions::camera(double framesLater) const {
   if (const auto& c = frame.crop; c && (c->x1 > frame.width || c->y1 > frame.height))
     refuseValue("--crop", fmt::format("{},{},{},{}", c->x0, c->y0, c->x1, c->y1),
                 fmt::format("within the picture, 0,0,{},{}", frame.width, frame.height));
@@ -240,7 +260,7 @@ Camera CameraOptions::camera(const RenderVolume& volume, double framesLater) con
                                "nothing moves; give --camera, --volume-motion or --velocity-grid");
   if (volumeMotion && shutter.isInstant())
     throw CLI::ValidationError("--volume-motion", "shows only while the shutter is open; give --shutter");
-  Placement placement(*this, volume);
+  Placement placement(*this);
   if (file.empty()) return placement.camera();
 
   const CameraMotion motion = readCameraFile(file, rotationOrder);
@@ -257,11 +277,11 @@ Camera CameraOptions::camera(const RenderVolume& volume, double framesLater) con
   return camera.withShutter(poses);
 }
 
-std::optional<RigidMotion> CameraOptions::motionOf(const RenderVolume& volume) const {
+std::optional<RigidMotion> CameraOptions::motion() const {
   if (!volumeMotion || shutter.isInstant()) return std::nullopt;
-  RigidMotion motion = *volumeMotion;
-  motion.centre = Vec3d(middleOf(volume));
-  return motion;
+  RigidMotion result = *volumeMotion;
+  result.centre = Vec3d(middleOf(seen));
+  return result;
 }
 
 }  // namespace nephele::apps

@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/app.h"
+#include "apps/extent.h"
 #include "apps/options/options.h"
 #include "nephele/render/scene/camera_motion.h"
-#include "nephele/render/volume/render_volume.h"
 
 namespace nephele::apps {
 
@@ -19,12 +20,14 @@ struct CameraOptions {
   Vec3f view{25, 5, 0};
   std::optional<Vec3f> position, lookAt;
   Vec3f up{0, 1, 0};
-  /// What `view` frames; the outline of the volume if empty.
-  std::vector<Vec3f> framed;
+  /// What is looked at: `view` frames its outline. Filled in by `placed`.
+  Extent seen{};
   std::string file;
   RotationOrder rotationOrder;
-  /// Frame of the file; its first if not given.
+  /// Frame of the file; that of the run, or else its first, if not given.
   std::optional<double> frameNumber;
+  /// This is one of many pictures, and the width of an orthographic one must not change.
+  bool isOneOfMany = false;
   /// What is given here goes before what the file says. Focal length and film in millimetres.
   std::optional<double> fovDegrees, focalLength;
   double filmWidth = 36;
@@ -38,16 +41,20 @@ struct CameraOptions {
   /// The volume has velocities, so that a shutter shows without any other motion.
   bool volumeFlows = false;
 
-  /// The camera that these options place around `volume`. @throws CLI::Error for options that do not fit
+  /// These options for a picture of `own`; in a sequence, of all that its pictures show.
+  CameraOptions placed(const Extent& own, const Run& run) const;
+  /// The camera that these options place around what is seen. @throws CLI::Error for options that do not fit
   /// together, Error for a bad file.
-  Camera camera(const RenderVolume& volume) const { return camera(volume, 0); }
+  Camera camera() const { return camera(0); }
   /// The camera of `file` so many frames later; nothing without a file.
-  std::optional<Camera> laterCamera(const RenderVolume& volume, double frames) const;
-  /// The motion of `volume`, about its middle; nothing for an instant.
-  std::optional<RigidMotion> motionOf(const RenderVolume& volume) const;
+  std::optional<Camera> laterCamera(double frames) const;
+  /// The motion of the volume, about the middle of what is seen; nothing for an instant.
+  std::optional<RigidMotion> motion() const;
+  /// Of `points`, enough for the camera to frame them together with others.
+  std::vector<Vec3f> outermost(const std::vector<Vec3f>& points) const;
 
  private:
-  Camera camera(const RenderVolume& volume, double framesLater) const;
+  Camera camera(double framesLater) const;
 };
 
 /// Declares the options on `app`.

@@ -20,7 +20,7 @@ int CloudArguments::layerCount() const {
 FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
   // Few bumps rise above twice their rms; farther out look-ups are slower, not wrong.
   constexpr double kHighest = 2;
-  const double longestSide = boundingBox(mesh).longestSide();
+  const double longestSide = run.longestSide(boundingBox(mesh));
   double rms = 0;
   for (int i = 0; i < layerCount(); ++i) {
     const bool hasOwn = std::size_t(i) < recipe.size() && recipe[std::size_t(i)].amplitude;
@@ -34,12 +34,13 @@ FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
           run};
 }
 
-CloudOptions CloudArguments::resolved(FieldSources& sources) const {
+CloudOptions CloudArguments::resolved(FieldSources& sources, const Run& run) const {
   CloudOptions result = cloud;
   result.voxelSize = float(sources.voxelSize());
   CumuloFractal form = fractal;
   form.layers = layerCount();
-  if (noiseTime) form.noise.time = float(*noiseTime);
+  const double passed = noiseSpeed * (run.part ? run.part->framesSinceFirst : 0);
+  if (noiseTime) form.noise.time = float(*noiseTime + passed);
   if (noisePeriod) form.noise.period = float(*noisePeriod);
   form.amplitude = sources.field(amplitude);
   form.frequency = sources.field(frequency);
@@ -48,12 +49,23 @@ CloudOptions CloudArguments::resolved(FieldSources& sources) const {
   form.billow = sources.field(billow);
   form.billowScale = sources.field(billowScale);
   form.seed = std::uint32_t(seed);
-  result.layers = recipeLayers(recipe, form, sources);
+  std::vector<LayerRecipe> now = recipe;
+  for (LayerRecipe& layer : now)
+    if (layer.time) *layer.time += float(passed);
+  result.layers = recipeLayers(now, form, sources);
   result.edgeThickness = sources.field(edgeThickness);
   result.edgeExponent = density.edgeExponent;
   result.densityFactor = density.factor(sources, shape.isGenerated(), form.seed);
   result.withSurface = !surface.empty();
   return result;
+}
+
+Extent CloudArguments::extent(Run& run) const {
+  if (!shape.isGenerated()) return extentOfFile(shape.input);
+  ShapeArguments only = shape;
+  only.meshOutput.clear();
+  const Box box = boundingBox(only.shape(run));
+  return {box, double(box.longestSide())};
 }
 
 std::string CloudArguments::noiseOf(std::size_t index) const {
@@ -76,8 +88,13 @@ void addLayerOptions(CLI::App& app, CloudArguments& a) {
   std::vector<std::pair<std::string, NoiseKind>> kinds;
   for (const NoiseKind kind : noiseKinds()) kinds.emplace_back(noiseName(kind), kind);
   addChoice<NoiseKind>(app, "--noise", a.fractal.noise.kind, kinds, "Noise of the layers.");
-  auto* time = addOptional(app, "--noise-time", a.noiseTime, -1e6, 1e6,
-                           "Set the noise in motion, and take it at this time: another after about 1.");
+  auto* time =
+      addOptional(app, "--noise-time", a.noiseTime, -1e6, 1e6,
+                  "Set the noise in motion, and take it at this time, or the first of --frames: another "
+                  "after about 1.");
+  addNumber(app, "--noise-speed", a.noiseSpeed, -1e6, 1e6,
+            "Time that passes for noises in motion from one of --frames to the next.")
+      ->default_str("1/24");
   addOptional(app, "--noise-period", a.noisePeriod, 1e-3, 1e6,
               "Time after which the moving noise is the same again.")
       ->needs(time);

@@ -31,6 +31,8 @@ struct CloudArguments {
   CumuloFractal fractal;
   const CLI::Option* layersOption = nullptr;
   std::optional<double> noiseTime, noisePeriod;
+  /// A second of 24 frames to a unit of time.
+  double noiseSpeed = 1.0 / 24;
   std::vector<LayerRecipe> recipe;
   CloudOptions cloud;
   bool halfFloat = false;
@@ -42,7 +44,9 @@ struct CloudArguments {
   /// What the parameters of a cloud on `mesh` are made from.
   FieldSources sources(const Mesh& mesh, const Run& run) const;
   /// The library's options. @throws Error naming an option whose field cannot be made.
-  CloudOptions resolved(FieldSources& sources) const;
+  CloudOptions resolved(FieldSources& sources, const Run& run) const;
+  /// Of the shape. @throws Error naming the file.
+  Extent extent(Run& run) const;
   /// What noise layer `index` has: "worley, 3 octaves".
   std::string noiseOf(std::size_t index) const;
 };

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "apps/looks.h"
 #include "apps/options/old_names.h"
@@ -35,16 +34,6 @@ std::string textOf(const std::string& path, const std::string& key, const toml::
   if (auto number = value.value_exact<double>()) return fmt::format("{}", *number);
   refuse(path, value.source().begin,
          fmt::format("'{}' must be a text, a number, true, false or an array", key));
-}
-
-// The last text that `arguments` give to an option, as words of their own or behind an equals sign.
-std::optional<std::string> givenTo(const std::string& option, const std::vector<std::string>& arguments) {
-  std::optional<std::string> text;
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    if (arguments[i] == option && i + 1 < arguments.size()) text = arguments[i + 1];
-    if (arguments[i].starts_with(option + "=")) text = arguments[i].substr(option.size() + 1);
-  }
-  return text;
 }
 
 // Whether any of `arguments` is neither an option nor what one takes.
@@ -148,6 +137,15 @@ std::vector<std::string> withLook(const ConfiguredVerb& verb, const std::string&
 }
 
 }  // namespace
+
+std::optional<std::string> givenTo(const std::string& option, const std::vector<std::string>& arguments) {
+  std::optional<std::string> text;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i] == option && i + 1 < arguments.size()) text = arguments[i + 1];
+    if (arguments[i].starts_with(option + "=")) text = arguments[i].substr(option.size() + 1);
+  }
+  return text;
+}
 
 std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<std::string> arguments) {
   const std::optional<std::string> path = givenTo("--config", arguments), look = givenTo("--look", arguments);

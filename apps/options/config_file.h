@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,5 +20,8 @@ struct ConfiguredVerb {
 /// verb alone. Then the same of the look named by --look, as far as it goes with what is there.
 /// @throws CLI::ParseError naming the file, the line and the key, or the look.
 std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<std::string> arguments);
+
+/// The last text that `arguments` give to an option, as words of their own or behind an equals sign.
+std::optional<std::string> givenTo(const std::string& option, const std::vector<std::string>& arguments);
 
 }  // namespace nephele::apps

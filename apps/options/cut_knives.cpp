@@ -8,12 +8,6 @@
 namespace nephele::apps {
 namespace {
 
-Box boxOf(const std::vector<CutPart>& parts) {
-  Box box;
-  for (const CutPart& part : parts) box = box.including(boundingBox(part.mesh));
-  return box;
-}
-
 std::string planeText(const BladePlane& plane) {
   const auto &p = plane.point, &n = plane.normal;
   return fmt::format("{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z);
@@ -21,11 +15,17 @@ std::string planeText(const BladePlane& plane) {
 
 }  // namespace
 
+Box boxOf(const std::vector<CutPart>& parts) {
+  Box box;
+  for (const CutPart& part : parts) box = box.including(boundingBox(part.mesh));
+  return box;
+}
+
 CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run& run) {
   CutKnives result;
   Knives& knives = result.knives;
-  const Box box = boxOf(parts);
-  const auto side = double(box.longestSide());
+  const Box box = run.box(boxOf(parts));
+  const double side = run.longestSide(box);
   std::vector<BladePlane> planes = a.planes;
   const auto random = randomBlades(
       {.count = a.randomPlanes, .box = box, .throughCentre = a.throughCentre, .seed = std::uint32_t(a.seed)});

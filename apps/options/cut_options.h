@@ -53,6 +53,7 @@ struct CutKnives {
 };
 
 /// @throws CLI::ValidationError if there is no knife, Error naming a file.
+Box boxOf(const std::vector<CutPart>& parts);
 CutKnives knivesOf(const CutArguments& arguments, const std::vector<CutPart>& parts, Run& run);
 
 /// Declares the options on `app`.

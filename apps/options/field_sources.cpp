@@ -48,8 +48,8 @@ FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run&
     : shape_(shape),
       options_(options),
       run_(run),
-      box_(boundingBox(shape)),
-      longestSide_(box_.longestSide()) {}
+      box_(run.box(boundingBox(shape))),
+      longestSide_(run.longestSide(boundingBox(shape))) {}
 
 ScalarField FieldSources::field(const FieldValue& value) {
   std::vector<RampStop> stops;
@@ -104,15 +104,16 @@ ScalarField FieldSources::mask(const FieldValue& value) {
   const VdbGridInfo info = describe(grid);
   const auto bricks = namingFile(value.path, [&] { return toBricks(grid); });
   const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
-  const Box active = activeBox(info, bricks->indexToWorld()), common = active.intersection(box_);
+  const Box shape = boundingBox(shape_), active = activeBox(info, bricks->indexToWorld()),
+            common = active.intersection(shape);
   const std::string outside = fmt::format("; outside its grid it counts as {:g}",
                                           isLevelSet ? 0.0 : std::clamp(bricks->background(), 0.0f, 1.0f));
   if (common.isEmpty())
     run_.note(fmt::format(
         "warning: {}: mask {}: grid '{}' has no active voxel near the shape: it holds {}, the shape {}{}",
-        value.option, value.path, info.name, active.isEmpty() ? "none" : cornersOf(active), cornersOf(box_),
+        value.option, value.path, info.name, active.isEmpty() ? "none" : cornersOf(active), cornersOf(shape),
         outside));
-  else if (const double share = volumeOf(common) / volumeOf(box_); share < 0.995)
+  else if (const double share = volumeOf(common) / volumeOf(shape); share < 0.995)
     run_.note(fmt::format("{}: mask {}: the active voxels of grid '{}' span {:.0f} % of the shape's box{}",
                           value.option, value.path, info.name, 100 * share, outside));
   const ScalarField field = gridField(bricks);

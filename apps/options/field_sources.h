@@ -24,6 +24,7 @@ class FieldSources {
   /// Keeps references to both. `shape` must be triangulated.
   FieldSources(const Mesh& shape, const Options& options, const Run& run);
 
+  /// Of the shape; in a sequence of the largest, and the box around all.
   double longestSide() const { return longestSide_; }
   double voxelSize() const { return options_.voxelSize; }
   const Box& box() const { return box_; }

@@ -15,7 +15,7 @@ Mesh decimatedAsAsked(const Mesh& mesh, const MeshProcessing& asked, const std::
   DecimationOptions options;
   if (asked.faces > 0) options.faces = std::size_t(asked.faces);
   if (asked.maxError.value > 0)
-    options.maxError = asked.maxError.worldUnits(double(boundingBox(mesh).longestSide()));
+    options.maxError = asked.maxError.worldUnits(run.longestSide(boundingBox(mesh)));
   const std::size_t before = triangulated(mesh).faceCount();
   if (options.faces && before <= *options.faces) {
     run.note(fmt::format("{}: has {} triangles, no more than --faces {}: nothing is left out", name, before,

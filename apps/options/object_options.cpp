@@ -76,12 +76,13 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
       ->default_str("0.3,0.3,0.3");
 }
 
-std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, double mostBytes) const {
+std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, const Extent& seen,
+                                                        double mostBytes) const {
   if (any()) require(!volume.isEmpty(), "objects and the ground stand in a volume that is not empty");
   std::vector<SurfaceObject> all = painted(*this, objects, {0.5f, 0.5f, 0.5f}, mostBytes);
   for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path), .isHoldout = true});
   if (ground) {
-    const Box& box = volume.worldBounds();
+    const Box& box = seen.box;
     all.push_back({.mesh = groundPlane(box.center(), float(groundHeight.value_or(double(box.min.y))),
                                        200 * box.longestSide()),
                    .colour = groundColour,
@@ -102,7 +103,7 @@ void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, d
   for (const auto& [option, isGiven] : ofObjects)
     if (isGiven && objects.empty())
       throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");
-  picture.render.surfaces = surfaces(volume, mostBytes);
+  picture.render.surfaces = surfaces(volume, picture.seen, mostBytes);
 }
 
 }  // namespace nephele::apps

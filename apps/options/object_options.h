@@ -28,10 +28,12 @@ struct ObjectOptions {
   /// Of meshes and level sets that are the picture's only subject. @throws Error naming the file.
   std::vector<SurfaceObject> shapes(const std::vector<std::string>& paths, double mostBytes) const;
   bool any() const { return !objects.empty() || !holdouts.empty() || ground; }
-  /// Reads the files; null where there are no objects. @throws Error naming the file.
-  std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, double mostBytes) const;
-  /// Puts them into `picture`. @throws CLI::Error for options of objects where there are none, Error as
-  /// `surfaces`.
+  /// Reads the files, the ground under all that is `seen`; null where there are no objects. @throws Error
+  /// naming the file.
+  std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, const Extent& seen,
+                                           double mostBytes) const;
+  /// Puts them into `picture`, which is resolved. @throws CLI::Error for options of objects where there are
+  /// none, Error as `surfaces`.
   void addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const;
 };
 

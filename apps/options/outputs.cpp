@@ -16,8 +16,9 @@ namespace fs = std::filesystem;
 constexpr const char* kOutput = "output";
 constexpr const char* kTriedByVerb = "output tried by the verb";
 
-bool isMarked(CLI::Option& option, const char* mark) try {
-  return option.get_validator(mark) != nullptr;
+bool isMarked(const CLI::Option& option, const char* mark) try {
+  // CLI11 asks for an option that could be changed.
+  return const_cast<CLI::Option&>(option).get_validator(mark) != nullptr;
 } catch (const CLI::OptionNotFound&) {
   return false;
 }
@@ -63,6 +64,10 @@ std::vector<Given> givenOptions(CLI::App& app) {
 CLI::Option* markOutput(CLI::Option* option, OutputTrial trial) {
   return option->check(CLI::Validator([](std::string&) { return std::string(); }, std::string(),
                                       trial == OutputTrial::program ? kOutput : kTriedByVerb));
+}
+
+bool isOutput(const CLI::Option& option) {
+  return isMarked(option, kOutput) || isMarked(option, kTriedByVerb);
 }
 
 void requireDistinctOutputs(CLI::App& app) {

@@ -10,6 +10,9 @@ enum class OutputTrial { program, verb };
 /// Says that the value of an option is a file, or a folder, that the verb writes.
 CLI::Option* markOutput(CLI::Option* option, OutputTrial trial = OutputTrial::program);
 
+/// Whether that was said of an option.
+bool isOutput(const CLI::Option& option);
+
 /// Refuses outputs that are the same file as each other, or as an input. --output may be an input: that is
 /// work in place, since outputs are renamed when they are whole. Streams ("/dev/null") may be given often.
 /// @throws CLI::ValidationError naming both options.

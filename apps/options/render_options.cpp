@@ -71,8 +71,7 @@ void addIntegrator(CLI::App& app, PictureOptions& options) {
 }
 
 /// Shorter steps than a thousandth of a voxel show nothing more, and rays of too many steps never end.
-float stepIn(const RenderVolume& volume, const Length& step) {
-  const double longest = double(volume.worldBounds().longestSide());
+float stepIn(const RenderVolume& volume, const Length& step, double longest) {
   const double length = step.worldUnits(longest), shortest = double(volume.density().voxelSize()) / 1000;
   if (!volume.isEmpty() && length < shortest * (1 - 1e-6))
     refuseValue("--step", fmt::format("{:g}{}", step.value, step.relative ? "%" : ""),
@@ -136,24 +135,32 @@ PictureOptions PictureOptions::withView(ViewCurve otherwise) const {
   return result;
 }
 
-PictureOptions PictureOptions::resolved(const RenderVolume& volume, double mostBytes) const {
+Extent extentOf(const RenderVolume& volume) {
+  return {volume.worldBounds(), double(volume.worldBounds().longestSide()), volume.outline()};
+}
+
+PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& run) const {
   PictureOptions result = *this;
-  result.extinction = extinction ? *extinction : defaultExtinction(volume);
+  static_cast<CameraOptions&>(result) = placed(extentOf(volume), run);
+  if (!extinction)
+    result.extinction = run.part && run.part->range
+                            ? defaultExtinction(float(result.seen.longestSide), result.seen.typicalDensity)
+                            : defaultExtinction(volume);
   result.medium.extinction = *result.extinction;
-  if (step.value > 0) result.render.step = stepIn(volume, step);
+  if (step.value > 0) result.render.step = stepIn(volume, step, result.seen.longestSide);
   if (adaptiveThreshold > 0 && pathTraced)
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
   result.chooseByQuality(volume);
-  result.lights = light.resolved(mostBytes);
+  result.lights = light.resolved(run.memoryLimitBytes);
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");
   result.render.shutter = shutter;
   result.volumeFlows = !volumes.velocityGrids.empty();
-  result.render.volumeMotion = motionOf(volume);
+  result.render.volumeMotion = result.motion();
   if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
-    result.render.nextCamera = laterCamera(volume, 1);
+    result.render.nextCamera = result.laterCamera(1);
   result.render.seed = std::uint32_t(seed);
   return result;
 }

@@ -14,6 +14,7 @@
 #include "nephele/render/image/display_server.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"
+#include "nephele/render/volume/render_volume.h"
 
 namespace nephele::apps {
 
@@ -48,8 +49,8 @@ struct PictureOptions : CameraOptions {
   /// These options with `screen` filled in, by `otherwise` where no view was asked for.
   /// @throws CLI::ValidationError or Error if there is no such view.
   PictureOptions withView(ViewCurve otherwise = ViewCurve::filmic) const;
-  /// These options with everything filled in that follows from `volume`.
-  PictureOptions resolved(const RenderVolume& volume, double mostBytes) const;
+  /// These options with everything filled in that follows from `volume`, or in a sequence from all of them.
+  PictureOptions resolved(const RenderVolume& volume, const Run& run) const;
   /// Whether a still reads the samples of the volume's grid after its light has been made.
   bool needsSamples() const;
   /// Whether a density that is coded is enough for all of it.
@@ -68,6 +69,9 @@ struct PictureOptions : CameraOptions {
  private:
   void chooseByQuality(const RenderVolume& volume);
 };
+
+/// Of a volume, without its typical density, which costs a pass over it.
+Extent extentOf(const RenderVolume& volume);
 
 /// Says so if the picture for `path` holds values that no file can; returns how many.
 std::size_t noteNotFinite(const std::string& path, const Image& image, const Run& run);

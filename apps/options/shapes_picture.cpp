@@ -14,6 +14,25 @@
 
 namespace nephele::apps {
 
+namespace {
+
+Extent extentOf(const std::vector<SurfaceObject>& shapes) {
+  Extent result;
+  for (const SurfaceObject& shape : shapes)
+    for (const std::uint32_t v : shape.mesh.corners) {
+      result.outline.emplace_back(shape.mesh.positions[v]);
+      result.box = result.box.including(result.outline.back());
+    }
+  result.longestSide = double(result.box.longestSide());
+  return result;
+}
+
+}  // namespace
+
+Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run) {
+  return extentOf(objects.shapes(inputs, run.memoryLimitBytes));
+}
+
 bool areShapes(const std::vector<std::string>& paths) {
   return std::ranges::all_of(paths, [](const std::string& path) {
     if (isMeshFile(path)) return true;
@@ -27,11 +46,8 @@ void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOpti
                         const PictureOptions& options, const PictureFiles& files, Run& run) {
   run.begin("read");
   std::vector<SurfaceObject> shapes = objects.shapes(inputs, run.memoryLimitBytes);
-  CameraOptions camera = options;
-  for (const SurfaceObject& shape : shapes)
-    for (const std::uint32_t v : shape.mesh.corners) camera.framed.emplace_back(shape.mesh.positions[v]);
   SurfacePictureOptions shown;
-  shown.camera = camera.camera(RenderVolume(std::make_shared<const BrickGrid>()));
+  shown.camera = options.placed(extentOf(shapes), run).camera();
   if (shown.camera->hasLens() || shown.camera->isMoving())
     throw Error("meshes and level sets alone are shown without --f-stop, --lens-radius and --shutter");
   run.requireMemory(estimateSurfacePictureBytes(shown.camera->width(), shown.camera->height()),

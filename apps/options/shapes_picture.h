@@ -11,6 +11,9 @@ namespace nephele::apps {
 /// the file.
 bool areShapes(const std::vector<std::string>& paths);
 
+/// Of meshes and level sets. @throws Error naming the file.
+Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run);
+
 /// Files of a picture: linear (.exr), and for the screen (.png) if there is to be one.
 struct PictureFiles {
   std::string output, preview;

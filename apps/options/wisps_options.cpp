@@ -76,7 +76,7 @@ std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
   const On where = on.value_or(mesh.faceCount() == 0 ? On::vertices : On::surface);
   require(where == On::vertices || mesh.faceCount() > 0,
           input + ": has no faces to scatter guides on; --on vertices puts one on each of its points");
-  const double side = double(boxOf(mesh).longestSide());
+  const double side = run.longestSide(boxOf(mesh));
   options.standard.size = float(size.worldUnits(side));
   require(std::isfinite(side), input + ": its points lie further apart than numbers of 32 bits can hold");
   // A single point has no extent that a share could be taken of.
@@ -89,7 +89,7 @@ std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
   });
 }
 
-WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) const {
+WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, const Run& run) const {
   WispVolumeOptions result;
   WispOptions& w = result.wisps;
   w = {.dots = std::uint32_t(dots),
@@ -103,7 +103,7 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made) c
        .vector = {displacementOctaves, float(displacementFrequency), float(lacunarity),
                   float(displacementRoughness)},
        .seed = std::uint32_t(seed)};
-  const double side = double(wispBox(made, w).longestSide());
+  const double side = run.longestSide(wispBox(made, w));
   namingFile(input, [&] {
     require(std::isfinite(side), "wisps: they reach further than numbers of 32 bits can hold");
   });

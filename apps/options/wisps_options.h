@@ -40,7 +40,7 @@ struct WispsArguments {
   /// The guides, read or scattered. @throws Error naming the file.
   std::vector<WispGuide> readGuides(Run& run) const;
   /// The library's options for these guides. @throws CLI::ValidationError where options exclude each other.
-  WispVolumeOptions resolved(const std::vector<WispGuide>& made) const;
+  WispVolumeOptions resolved(const std::vector<WispGuide>& made, const Run& run) const;
 };
 
 /// Declares the options on `app`.

@@ -26,6 +26,11 @@ void requireCarried(const CarriedGrids& input, const std::string& path) {
                           others.empty() ? "" : "; it holds " + others));
 }
 
+Extent extentOfCarried(const AdvectArguments& arguments, Run&) {
+  const Box box = carriedGrids(readVdbFile(arguments.input)).box;
+  return {box, double(box.longestSide())};
+}
+
 void carry(const AdvectArguments& arguments, Run& run) {
   AdvectionOptions options = arguments.resolved();
   run.begin("read");
@@ -37,7 +42,7 @@ void carry(const AdvectArguments& arguments, Run& run) {
     run.note(
         fmt::format("{}: grid {} is left out: only numbers and vectors are carried", arguments.input, grid));
   if (!arguments.continueFrom.empty()) options.startMap = readFlowMap(arguments.continueFrom);
-  const VectorField velocity = arguments.velocity.field(input.box.longestSide());
+  const VectorField velocity = arguments.velocity.field(run.longestSide(input.box));
   run.requireMemory(
       namingFile(arguments.input, [&] { return estimatedAdvectionBytes(input.bricks, options); }),
       "use a larger --map-coarseness, or larger voxels in the input");
@@ -71,7 +76,7 @@ Verb advectVerb() {
   return verbOf(
       "advect", "Carries the grids of a volume along with a velocity.",
       "nephele advect cloud.vdb -o wisps.vdb --velocity curl:amplitude=0.3%,frequency=8x --steps 12",
-      addAdvectOptions, carry);
+      addAdvectOptions, carry, {}, extentOfCarried);
 }
 
 }  // namespace nephele::apps

@@ -56,7 +56,7 @@ void growCloud(const CloudArguments& arguments, Run& run) {
   run.expect(0, 0.02);
   const Mesh shape = arguments.shape.shape(run);
   FieldSources sources = arguments.sources(shape, run);
-  const CloudOptions options = arguments.resolved(sources);
+  const CloudOptions options = arguments.resolved(sources, run);
   tellLayers(arguments, options, sources.box(), run);
   run.requireMemory(estimatedCloudBytes(shape, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
@@ -92,7 +92,8 @@ void growCloud(const CloudArguments& arguments, Run& run) {
 Verb cloudVerb() {
   return verbOf("cloud", "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
                 "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x", addCloudOptions,
-                growCloud, fieldValueHelp());
+                growCloud, fieldValueHelp(),
+                [](const CloudArguments& arguments, Run& run) { return arguments.extent(run); });
 }
 
 }  // namespace nephele::apps

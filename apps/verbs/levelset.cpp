@@ -51,7 +51,7 @@ void convert(const LevelsetOptions& options, Run& run) {
   const Mesh soup = readMesh(options.input);
   run.begin("repair");
   MeshRepairOptions repair = options.repair;
-  repair.voxelSize = voxelSizeOf(options, boundingBox(soup).longestSide());
+  repair.voxelSize = voxelSizeOf(options, run.longestSide(boundingBox(soup)));
   RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, repair, run); });
   for (const std::string& what : repaired.repairs) run.note(what);
   if (options.subdivide > 0) {
@@ -61,7 +61,7 @@ void convert(const LevelsetOptions& options, Run& run) {
   }
 
   MeshToLevelSetOptions conversion = options.conversion;
-  conversion.voxelSize = voxelSizeOf(options, repaired.after.box.longestSide());
+  conversion.voxelSize = voxelSizeOf(options, run.longestSide(repaired.after.box));
   run.requireMemory(
       estimateLevelSetBytes(repaired.mesh, conversion),
       "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");
@@ -91,7 +91,8 @@ void convert(const LevelsetOptions& options, Run& run) {
 
 Verb levelsetVerb() {
   return verbOf("levelset", "Turns a closed mesh into a signed distance volume.",
-                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", bindOptions, convert);
+                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", bindOptions, convert, {},
+                [](const LevelsetOptions& options, Run&) { return extentOfFile(options.input); });
 }
 
 }  // namespace nephele::apps

@@ -61,7 +61,8 @@ void makeMesh(const MeshOptions& options, Run& run) {
 Verb meshVerb() {
   return verbOf("mesh",
                 "Turns a level set or a density into a mesh, or decimates, smooths and subdivides one.",
-                "nephele mesh surface.vdb -o surface.obj --faces 20000", bindOptions, makeMesh);
+                "nephele mesh surface.vdb -o surface.obj --faces 20000", bindOptions, makeMesh, {},
+                [](const MeshOptions& options, Run&) { return extentOfFile(options.input); });
 }
 
 }  // namespace nephele::apps

@@ -23,7 +23,7 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
                MeshWarpOptions options, Run& run) {
   if (arguments.warpFile.empty() && arguments.warpedMesh.empty()) return;
   const Box box = boundingBox(object);
-  const double voxelSize = double(box.longestSide()) / arguments.resolution;
+  const double voxelSize = run.longestSide(box) / arguments.resolution;
   run.requireMemory(WarpBricks::estimateBytes(box, voxelSize), "use a lower --resolution");
   options.quality = WarpQuality::fast;
   // Grids would have to reach from one shape to the other; where that is far, distances stay exact.
@@ -91,7 +91,8 @@ void transfer(const TransferArguments& arguments, Run& run) {
 Verb transferVerb() {
   return verbOf("transfer", "Carries texture coordinates and other attributes from one mesh to another.",
                 "nephele transfer --from sphere.obj --to bunny.obj -o bunny_uv.obj --preview bunny.png",
-                addTransferOptions, transfer);
+                addTransferOptions, transfer, {},
+                [](const TransferArguments& arguments, Run&) { return extentOfFile(arguments.to); });
 }
 
 }  // namespace nephele::apps

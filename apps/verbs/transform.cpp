@@ -9,25 +9,41 @@ namespace {
 void moveMesh(const TransformOptions& options, Run& run) {
   const Mesh result = namingFile(options.input, [&] {
     Mesh turned = moved(readMesh(options.input), options.turn());
-    const Similarity shift = options.shift(boundingBox(turned));
+    const Similarity shift = options.shift(run.box(boundingBox(turned)));
     return moved(std::move(turned), shift);
   });
   run.begin("write");
   writeMesh(options.output, result);
 }
 
-void moveVolume(const TransformOptions& options, Run& run) {
+std::vector<VdbGrid> turnedGrids(const TransformOptions& options) {
   std::vector<VdbGrid> grids = readVdbFile(options.input);
   namingFile(options.input, [&] {
-    Box box;
-    for (VdbGrid& grid : grids) {
-      grid = moved(grid, options.turn());
-      box = box.including(activeBox(grid));
-    }
+    for (VdbGrid& grid : grids) grid = moved(grid, options.turn());
+  });
+  return grids;
+}
+
+Box boxOf(const std::vector<VdbGrid>& grids) {
+  Box box;
+  for (const VdbGrid& grid : grids) box = box.including(activeBox(grid));
+  return box;
+}
+
+void moveVolume(const TransformOptions& options, Run& run) {
+  std::vector<VdbGrid> grids = turnedGrids(options);
+  const Box box = run.box(boxOf(grids));
+  namingFile(options.input, [&] {
     for (VdbGrid& grid : grids) grid = moved(grid, options.shift(box));
   });
   run.begin("write");
   writeVdbFile(options.output, grids, run.metadata());
+}
+
+Extent extentOfTurned(const TransformOptions& options, Run&) {
+  const Box box = isVolumeFile(options.input) ? boxOf(turnedGrids(options))
+                                              : boundingBox(moved(readMesh(options.input), options.turn()));
+  return {box, double(box.longestSide())};
 }
 
 void transform(const TransformOptions& options, Run& run) {
@@ -44,7 +60,7 @@ void transform(const TransformOptions& options, Run& run) {
 Verb transformVerb() {
   return verbOf("transform", "Moves, turns and scales a mesh or a volume; changes its up axis or unit.",
                 "nephele transform scan.ply -o scan.obj --up-axis z --unit mm --place ground",
-                addTransformOptions, transform);
+                addTransformOptions, transform, {}, extentOfTurned);
 }
 
 }  // namespace nephele::apps

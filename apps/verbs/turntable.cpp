@@ -44,16 +44,15 @@ void bindOptions(CLI::App& app, TurntableOptions& options) {
 
 // The camera of the first frame, which frames all that any frame shows. The shutter and what it blurs come
 // later.
-Camera firstCamera(const TurntableOptions& options, const PictureOptions& picture,
-                   const RenderVolume& volume) {
+Camera firstCamera(const TurntableOptions& options, const PictureOptions& picture) {
   CameraOptions camera = picture;
-  if (options.orbit != Orbit::light && !volume.isEmpty())
-    camera.framed = sweptOutline(volume.outline(), volume.worldBounds().center());
+  if (options.orbit != Orbit::light && !camera.seen.box.isEmpty())
+    camera.seen.outline = sweptOutline(camera.seen.outline, camera.seen.box.center());
   if (camera.file.empty()) {
     camera.shutter = {};
     camera.volumeMotion.reset();
   }
-  return camera.camera(volume);
+  return camera.camera();
 }
 
 void makeTurntable(const TurntableOptions& options, Run& run) {
@@ -67,9 +66,9 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
       readVolumes({options.input}, options.picture.volumes,
                   {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
-  picture = picture.resolved(volume, run.memoryLimitBytes);
+  picture = picture.resolved(volume, run);
   options.objects.addTo(picture, volume, run.memoryLimitBytes);
-  const Camera start = firstCamera(options, picture, volume);
+  const Camera start = firstCamera(options, picture);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.
   const double bytes = picture.estimateBytes(volume, start);

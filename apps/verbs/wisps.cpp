@@ -22,9 +22,15 @@ void append(Mesh& all, const Mesh& part) {
                                       part.attributes[a].values.end());
 }
 
+Extent extentOfWisps(const WispsArguments& arguments, Run& run) {
+  const std::vector<WispGuide> guides = arguments.readGuides(run);
+  const Box box = wispBox(guides, arguments.resolved(guides, run).wisps);
+  return {box, double(box.longestSide())};
+}
+
 void makeWisps(const WispsArguments& arguments, Run& run) {
   const std::vector<WispGuide> guides = arguments.readGuides(run);
-  WispVolumeOptions options = arguments.resolved(guides);
+  WispVolumeOptions options = arguments.resolved(guides, run);
   const double dots = double(guides.size()) * options.wisps.dots;
   run.requireMemory(
       estimatedWispBytes(guides, options) + (arguments.points.empty() ? 0 : dots * kPointBytes),
@@ -66,7 +72,7 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
 Verb wispsVerb() {
   return verbOf("wisps", "Grows wisps of fine dots on guide particles.",
                 "nephele wisps particles.ply -o wisps.vdb --wisp-size 5% --dots 50000", addWispsOptions,
-                makeWisps);
+                makeWisps, {}, extentOfWisps);
 }
 
 }  // namespace nephele::apps

@@ -128,21 +128,38 @@ std::vector<int> FrameRange::shard(int index, int count) const {
   return frames;
 }
 
-FramePattern FramePattern::parse(const std::string& text) {
+namespace {
+
+// Calls `found(at, place)` for every place in the file name of `text`; returns how many there are.
+template <class Found>
+int eachPlace(const std::string& text, const Found& found) {
   const std::size_t slash = text.rfind('/'), start = slash == std::string::npos ? 0 : slash + 1;
-  FramePattern pattern;
-  pattern.text_ = text;
   int count = 0;
   for (std::size_t at = start; at < text.size();) {
     const Place place = placeAt(text, at);
     if (place.length > 0) {
       ++count;
-      pattern.before_ = text.substr(0, at);
-      pattern.after_ = text.substr(at + place.length);
-      pattern.width_ = place.width;
+      found(at, place);
     }
     at += std::max<std::size_t>(place.length, 1);
   }
+  return count;
+}
+
+}  // namespace
+
+int FramePattern::places(const std::string& text) {
+  return eachPlace(text, [](std::size_t, const Place&) {});
+}
+
+FramePattern FramePattern::parse(const std::string& text) {
+  FramePattern pattern;
+  pattern.text_ = text;
+  const int count = eachPlace(text, [&](std::size_t at, const Place& place) {
+    pattern.before_ = text.substr(0, at);
+    pattern.after_ = text.substr(at + place.length);
+    pattern.width_ = place.width;
+  });
   if (count != 1)
     throw Error(
         fmt::format("'{}' has {} place{} for the frame number in its file name; allowed: one of ####, "

@@ -44,6 +44,8 @@ class FramePattern {
  public:
   /// @throws Error unless the file name of `text` has one such place; folders are taken as they are.
   static FramePattern parse(const std::string& text);
+  /// How many such places the file name of `text` has.
+  static int places(const std::string& text);
 
   std::string path(int frame) const;
   /// The folder of all frames, "." if none was given.

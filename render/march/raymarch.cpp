@@ -24,9 +24,12 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
+float defaultExtinction(float longestSide, float typicalDensity) {
+  return longestSide > 0 ? 150.0f / (longestSide * std::max(typicalDensity, 1.0f)) : 1.0f;
+}
+
 float defaultExtinction(const RenderVolume& volume) {
-  const float side = volume.worldBounds().longestSide();
-  return side > 0 ? 150.0f / (side * std::max(volume.typicalDensity(), 1.0f)) : 1.0f;
+  return defaultExtinction(volume.worldBounds().longestSide(), volume.typicalDensity());
 }
 
 // Maps that were read stay; the others are made one after the other.

@@ -17,6 +17,8 @@ namespace nephele {
 /// density 1, or at the typical density where that is larger. It gives a cumulus its crisp edge. 1 for an
 /// empty volume.
 float defaultExtinction(const RenderVolume& volume);
+/// The same of a volume of this longest side (world units) and typical density.
+float defaultExtinction(float longestSide, float typicalDensity);
 
 /// Looks at `volume` through `camera`: light precomputed, then marched, front to back, from every pixel.
 ///

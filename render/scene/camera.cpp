@@ -109,13 +109,64 @@ Camera Camera::lookingAt(const Vec3f& position, const Vec3f& target, const Vec3f
   return facing(Vec3d(position), normalize(right), cross(normalize(right), forward), frame);
 }
 
-Camera Camera::framing(std::span<const Vec3f> points, float azimuthDegrees, float elevationDegrees,
-                       const Frame& frame, float margin) {
-  require(margin >= 0 && margin < 0.5f, fmt::format("margin: expected [0, 0.5), got {}", margin));
+namespace {
+
+// How far points reach towards the four sides of a frustum, and towards the camera.
+struct Reach {
+  static constexpr double kNone = -std::numeric_limits<double>::infinity();
+  double east = kNone, west = kNone, north = kNone, south = kNone, near = kNone;
+  std::array<std::size_t, 5> points{};
+
+  void include(double right, double up, double forward, double tx, double ty, std::size_t point) {
+    const std::array<double, 5> reached{right - tx * forward, -right - tx * forward, up - ty * forward,
+                                        -up - ty * forward, -forward};
+    const std::array<double*, 5> most{&east, &west, &north, &south, &near};
+    for (std::size_t side = 0; side != most.size(); ++side)
+      if (reached[side] > *most[side]) {
+        *most[side] = reached[side];
+        points[side] = point;
+      }
+  }
+};
+
+}  // namespace
+
+Camera Camera::towards(float azimuthDegrees, float elevationDegrees, const Frame& frame) {
   const Vec3d back(directionTowards(azimuthDegrees, elevationDegrees));
   // Taken from the azimuth alone, so that looking straight up or down is no special case.
   const Vec3d right(directionTowards(azimuthDegrees + 90.0f, 0.0f));
-  Camera camera({}, right, cross(back, right), frame);
+  return Camera({}, right, cross(back, right), frame);
+}
+
+std::vector<Vec3f> Camera::outermost(std::span<const Vec3f> points, float azimuthDegrees,
+                                     float elevationDegrees, const Frame& frame, float margin) {
+  if (points.empty()) return {};
+  const Camera camera = towards(azimuthDegrees, elevationDegrees, frame);
+  const Pose& pose = camera.pose_;
+  const double free = camera.isOrthographic() ? 0 : 1 - 2 * margin;
+  const Vec3d first(points.front());
+  Reach reach;
+  std::size_t farthest = 0;
+  double extent = 0;
+  for (std::size_t i = 0; i != points.size(); ++i) {
+    const Vec3d p = Vec3d(points[i]) - first;
+    if (length(p) > extent) {
+      extent = length(p);
+      farthest = i;
+    }
+    reach.include(dot(p, pose.right), dot(p, pose.up), dot(p, pose.forward), free * pose.halfWidth,
+                  free * pose.halfHeight, i);
+  }
+  // What `framing` measures from stays the same, too.
+  std::vector<Vec3f> result{points.front(), points[farthest]};
+  for (const std::size_t i : reach.points) result.push_back(points[i]);
+  return result;
+}
+
+Camera Camera::framing(std::span<const Vec3f> points, float azimuthDegrees, float elevationDegrees,
+                       const Frame& frame, float margin) {
+  require(margin >= 0 && margin < 0.5f, fmt::format("margin: expected [0, 0.5), got {}", margin));
+  Camera camera = towards(azimuthDegrees, elevationDegrees, frame);
   Pose& pose = camera.pose_;
 
   static constexpr Vec3f kUnit[] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
@@ -124,19 +175,16 @@ Camera Camera::framing(std::span<const Vec3f> points, float azimuthDegrees, floa
   const bool parallel = camera.isOrthographic();
   const double tx = parallel ? 0 : pose.halfWidth * (1 - 2 * margin),
                ty = parallel ? 0 : pose.halfHeight * (1 - 2 * margin);
-  constexpr double inf = std::numeric_limits<double>::infinity();
-  double east = -inf, west = -inf, north = -inf, south = -inf, nearest = inf, extent = 0;
+  double extent = 0;
   const Vec3d first(points.front());
+  Reach reach;
   for (const Vec3f& point : points) {
     const Vec3d p = Vec3d(point) - first;
-    const double r = dot(p, pose.right), u = dot(p, pose.up), f = dot(p, pose.forward);
-    east = std::max(east, r - tx * f);
-    west = std::max(west, -r - tx * f);
-    north = std::max(north, u - ty * f);
-    south = std::max(south, -u - ty * f);
-    nearest = std::min(nearest, f);
+    reach.include(dot(p, pose.right), dot(p, pose.up), dot(p, pose.forward), tx, ty, 0);
     extent = std::max(extent, length(p));
   }
+  const auto& [east, west, north, south, near, none] = reach;
+  const double nearest = -near;
   double z = nearest - std::max(extent, 1e-6);
   if (!parallel) {
     // A single point, or points on one line of sight, would put the camera onto them.

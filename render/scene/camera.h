@@ -62,6 +62,10 @@ class Camera {
   /// @throws Error if the frame is not usable.
   static Camera framing(std::span<const Vec3f> points, float azimuthDegrees, float elevationDegrees,
                         const Frame& frame, float margin = 0.04f);
+  /// Those of `points` that decide where `framing` puts the camera, seven at most: so that the points of many
+  /// clouds can be framed together without being kept.
+  static std::vector<Vec3f> outermost(std::span<const Vec3f> points, float azimuthDegrees,
+                                      float elevationDegrees, const Frame& frame, float margin = 0.04f);
 
   /// This camera with `lens` instead of a pinhole. @throws Error if the radius is negative or the focus
   /// distance not above 0.
@@ -129,6 +133,8 @@ class Camera {
   };
 
   Camera(const Vec3d& position, const Vec3d& right, const Vec3d& up, const Frame& frame);
+  /// At the origin, looking the other way.
+  static Camera towards(float azimuthDegrees, float elevationDegrees, const Frame& frame);
   void setWidth(double width);
   Ray rayFrom(const Pose& pose, double x, double y) const;
   Pose poseAt(double time) const;

@@ -67,7 +67,7 @@ const std::vector<apps::Verb>& verbs() {
 /// Parses arguments as a verb does; its body does not run.
 void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
   CLI::App app(verb.summary, verb.name);
-  verb.bind(app);
+  const apps::BoundVerb bound = verb.bind(app);
   app.allow_extras();
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;

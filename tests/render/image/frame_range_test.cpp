@@ -113,5 +113,12 @@ TEST(FramePattern, RefusesNoneOrSeveralPlaces) {
     EXPECT_THROW(FramePattern::parse(text), Error) << text;
 }
 
+TEST(FramePattern, CountsPlacesInTheFileName) {
+  EXPECT_EQ(FramePattern::places("a.vdb"), 0);
+  EXPECT_EQ(FramePattern::places("a.####/b.vdb"), 0);
+  EXPECT_EQ(FramePattern::places("50% of a.$F4.vdb"), 1);
+  EXPECT_EQ(FramePattern::places("a.##.%04d.vdb"), 2);
+}
+
 }  // namespace
 }  // namespace nephele

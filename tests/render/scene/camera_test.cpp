@@ -302,6 +302,22 @@ TEST(MotionBlur, FollowsACameraThatTurns) {
   EXPECT_FALSE(camera.withShutter({}).isMoving());
 }
 
+TEST(Camera, FramesTheOutermostPointsAsItFramesAll) {
+  std::vector<Vec3f> points;
+  for (int i = 0; i != 500; ++i)
+    points.push_back({std::sin(1.7f * float(i)), 3 * std::cos(2.3f * float(i)), 0.01f * float(i)});
+  for (const Camera::Frame& frame : {kFrame, kParallel})
+    for (const float azimuth : {0.0f, 25.0f, 190.0f}) {
+      const std::vector<Vec3f> few = Camera::outermost(points, azimuth, 15, frame);
+      EXPECT_LE(few.size(), 7u);
+      const Camera one = Camera::framing(few, azimuth, 15, frame),
+                   all = Camera::framing(points, azimuth, 15, frame);
+      EXPECT_EQ(one.worldToCamera(), all.worldToCamera());
+      EXPECT_EQ(one.screenWidth(), all.screenWidth());
+    }
+  EXPECT_TRUE(Camera::outermost({}, 0, 0, kFrame).empty());
+}
+
 TEST(Camera, RefusesLensesAndFramesThatCannotBe) {
   const Camera camera = Camera::lookingAt({0, 0, 1}, {0, 0, 0}, {0, 1, 0}, kFrame);
   EXPECT_THROW(camera.withLens({-1, 1}), Error);

@@ -1,0 +1,111 @@
+#include "apps/detail/command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/looks.h"
+#include "apps/options/common_group.h"
+
+namespace nephele::apps {
+namespace {
+
+void addSeveralCalls(CLI::App& app, CommonOptions& options) {
+  app.add_option("--frames", options.frames,
+                 "Make one call for every frame, 1-48 or 1001-1100x2,1150, with its number in place of the "
+                 "####, %04d or $F4 in names of files.")
+      ->type_name("FRAMES")
+      ->group(kSeveralGroup);
+  app.add_option("--only", options.only,
+                 "Make only those of --frames that are in this range, too; what is chosen from the data is "
+                 "chosen from all.")
+      ->type_name("FRAMES")
+      ->group(kSeveralGroup);
+  app.add_option("--shard", options.shard, "Make the share of machine I of N (from 1): every N-th frame.")
+      ->type_name("I/N")
+      ->group(kSeveralGroup);
+  if (!app.get_option_no_throw("--output")) return;
+  app.add_flag("--skip-existing", options.skipExisting,
+               "Keep the frames that are there, whole and made with the same options.")
+      ->group(kSeveralGroup);
+}
+
+void addCommonOptions(CLI::App& app, CommonOptions& options) {
+  const std::string group = kCommonGroup;
+  addCount(app, "--threads", options.threads, 0, 4096, "Threads to use; 0: all that the process may use.")
+      ->group(group);
+  app.add_flag("--quiet", options.quiet, "Print errors only.")->group(group);
+  app.add_flag("--verbose", options.verbose, "Print the time of every stage.")->group(group);
+  app.add_option("--config", options.config, "Read options by name from a TOML file; the command line wins.")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--look", options.look,
+                 fmt::format("Options that go together, by name: {}. The command line and --config win.",
+                             fmt::join(lookNames(), ", ")))
+      ->type_name("NAME")
+      ->group(group);
+  markOutput(app.add_option("--stats", options.stats, "Write statistics as one JSON object."))
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--progress", options.progress, "auto, or alf for lines that farm software reads.")
+      ->check(CLI::IsMember({"auto", "alf"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--memory-limit", options.memoryLimit,
+                 "Refuse work that needs more: 8G, 512M or a share of memory.")
+      ->capture_default_str()
+      ->group(group);
+  app.add_flag("--overwrite", options.overwrite, "Replace outputs that exist; this is the default.")
+      ->group(group);
+}
+
+std::vector<std::string> optionNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group :
+       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    for (const std::string& name : optionNames(*group)) names.push_back(name);
+  return names;
+}
+
+/// CLI11 takes "--flag=-1" as an order to switch the flag off.
+void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
+  const std::size_t equals = argument.find('=');
+  if (!argument.starts_with("--") || equals == std::string::npos) return;
+  const std::string name = argument.substr(0, equals);
+  const CLI::Option* option = app.get_option_no_throw(name);
+  if (option && option->get_items_expected_max() == 0)
+    refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
+}
+
+}  // namespace
+
+Command::Command(const Verb& of) : verb(of), app(of.summary, "nephele " + of.name) {
+  app.footer((verb.notes.empty() ? "" : verb.notes + "\n") + "Example:\n  " + verb.example);
+  app.set_help_flag("-h,--help", "Print the options of the first day and exit.");
+  app.set_help_all_flag("--help-all", "Print all options and exit.");
+  app.get_formatter()->column_width(34);
+  // Collected, so that a suggestion can be made for each.
+  app.allow_extras();
+  bound = verb.bind(app);
+  ownFrames_ = app.get_option_no_throw("--frames") != nullptr;
+  if (!ownFrames_) addSeveralCalls(app, options);
+  addCommonOptions(app, options);
+}
+
+void Command::parse(std::vector<std::string> arguments) {
+  for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
+  std::reverse(arguments.begin(), arguments.end());
+  app.parse(std::move(arguments));
+  for (const std::string& extra : app.remaining()) {
+    if (!extra.starts_with('-'))
+      throw CLI::ParseError(fmt::format("'{}' is one argument too many", extra), CLI::ExitCodes::ExtrasError);
+    const std::string meant = closestWord(extra.substr(0, extra.find('=')), optionNames(app));
+    throw CLI::ParseError(fmt::format("unknown option '{}'{}", extra,
+                                      meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)),
+                          CLI::ExitCodes::ExtrasError);
+  }
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,111 @@
+#include "apps/detail/several_calls.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/options_digest.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele::apps {
+namespace {
+
+/// Options by which a call is not what it makes.
+constexpr std::string_view kOthers[]{"frames", "only", "shard"};
+
+/// Of all inputs together; nothing where the verb chooses nothing by them.
+std::optional<Extent> measured(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
+  if (!calls.variesInputs) return std::nullopt;
+  std::optional<Extent> all;
+  run.beginPart("measure", 0, 0.05);
+  for (std::size_t i = 0; i != calls.count; ++i) {
+    const Call call = calls.at(i);
+    Command command(verb);
+    command.parse(call.arguments);
+    if (!command.bound.measure) break;
+    run.check();
+    run.part = call.part;
+    run.begin(call.name);
+    const Extent one = command.bound.measure(run);
+    all ? all->include(one) : void(all = one);
+  }
+  run.part.reset();
+  run.endPart();
+  return all;
+}
+
+std::string textOf(const Extent& range) {
+  std::string text = fmt::format("{} {}", range.longestSide, range.typicalDensity);
+  const auto add = [&](const Vec3f& p) { text += fmt::format(" {},{},{}", p.x, p.y, p.z); };
+  add(range.box.min);
+  add(range.box.max);
+  for (const Vec3f& point : range.outline) add(point);
+  return text;
+}
+
+/// What the call makes, but for streams.
+std::vector<std::string> outputsOf(const CLI::App& app) {
+  std::vector<std::string> files;
+  for (const CLI::Option* option : app.get_options())
+    if (isOutput(*option) && !option->check_lname("stats") && !option->check_lname("contact-sheet"))
+      for (const std::string& value : option->results()) files.push_back(value);
+  return files;
+}
+
+bool isThere(const Command& command, const std::string& digest, const Run& run) {
+  for (const std::string& path : outputsOf(command.app)) {
+    if (!std::filesystem::exists(path)) return false;
+    const std::string defect = outputDefect(path, digest);
+    if (defect.empty()) continue;
+    run.note(fmt::format("{}: {}; it is made again", path, defect));
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
+  const std::optional<Extent> range = measured(verb, calls, run);
+  auto list = nlohmann::json::array();
+  std::size_t skipped = 0;
+  const std::size_t count = calls.made.size();
+  for (std::size_t i = 0; i != count; ++i) {
+    const Call call = calls.at(calls.made[i]);
+    try {
+      run.check();
+      Command command(verb);
+      command.parse(call.arguments);
+      const double share = 0.95 / double(count);
+      run.part = call.part;
+      run.part->range = range;
+      run.beginPart(call.name, 0.05 + share * double(i), 0.05 + share * double(i + 1));
+      run.part->digest =
+          optionsDigest(command.app, kOthers,
+                        fmt::format("{} {}", call.part.framesSinceFirst, range ? textOf(*range) : ""));
+      const bool skips = calls.skipExisting && isThere(command, run.part->digest, run);
+      skipped += skips;
+      if (!skips) command.bound.body(run);
+      nlohmann::json entry = {{"name", call.name}, {"skipped", skips}};
+      if (call.part.frame) entry["frame"] = *call.part.frame;
+      entry.update(run.endPart());
+      list.push_back(std::move(entry));
+    } catch (const std::exception&) {
+      run.endPart();
+      run.note(
+          fmt::format("ended at {}: {} of {} {} are whole; the same call with --skip-existing makes the rest",
+                      call.name, i, count, calls.list));
+      throw;
+    }
+  }
+  run.part.reset();
+  if (skipped > 0) run.note(fmt::format("{} of {} {} were there and whole", skipped, count, calls.list));
+  run.stats[calls.list] = std::move(list);
+  if (range)
+    run.stats["range"] = {{"box",
+                           {{range->box.min.x, range->box.min.y, range->box.min.z},
+                            {range->box.max.x, range->box.max.y, range->box.max.z}}},
+                          {"longest_side", range->longestSide}};
+}
+
+}  // namespace nephele::apps

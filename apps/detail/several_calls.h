@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+
+#include "apps/detail/command.h"
+#include "apps/detail/program_run.h"
+#include "apps/sequence.h"
+
+namespace nephele::apps {
+
+/// The calls that one command line stands for.
+struct SeveralCalls {
+  std::size_t count = 0;
+  std::function<Call(std::size_t)> at;
+  /// Which of them to make.
+  std::vector<std::size_t> made{};
+  /// Inputs differ, so that what is chosen from them is chosen from all.
+  bool variesInputs = false;
+  /// What --stats calls their list: "frames"
+  std::string list;
+  bool skipExisting = false;
+};
+
+/// Makes one call after another, each on all threads. What is whole stays where a later one fails or is
+/// stopped, and it is said how many there are. The statistics of `run` get the list of calls.
+/// @throws as the verb does.
+void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run);
+
+}  // namespace nephele::apps

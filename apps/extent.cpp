@@ -1,0 +1,38 @@
+#include "apps/extent.h"
+
+#include <algorithm>
+
+#include "nephele/levelset/io/point_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/mesh.h"
+
+namespace nephele::apps {
+namespace {
+
+Box boxOfFile(const std::string& path) {
+  if (!isVolumeFile(path)) return boundingBox(readPoints(path));
+  const VdbGrid grid = readScalarGrid(path);
+  Box box = activeBox(grid);
+  const VdbGridInfo info = describe(grid);
+  if (info.gridClass != VdbGridInfo::Class::levelSet || box.isEmpty()) return box;
+  // Active voxels reach as far beyond the surface as the distances do.
+  const Vec3f band{info.background, info.background, info.background};
+  const Box surface{box.min + band, box.max - band};
+  return surface.isEmpty() ? box : surface;
+}
+
+}  // namespace
+
+void Extent::include(const Extent& other) {
+  box = box.including(other.box);
+  longestSide = std::max(longestSide, other.longestSide);
+  outline.insert(outline.end(), other.outline.begin(), other.outline.end());
+  typicalDensity = std::max(typicalDensity, other.typicalDensity);
+}
+
+Extent extentOfFile(const std::string& path) {
+  const Box box = boxOfFile(path);
+  return {box, box.isEmpty() ? 0.0 : double(box.longestSide())};
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,54 @@
+#include "apps/options/scene_options.h"
+
+#include <fmt/format.h>
+
+#include "apps/options/shapes_picture.h"
+
+namespace nephele::apps {
+
+RenderVolume SceneOptions::volume(const PictureOptions& picture, Run& run) const {
+  RenderVolume result =
+      readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
+  if (result.isEmpty()) run.note(inputs.front() + ": the volume is empty, and so is its picture");
+  return result;
+}
+
+Extent SceneOptions::extent(const PictureOptions& picture, Run& run) const {
+  Extent extent;
+  if (areShapes(inputs)) {
+    extent = extentOfShapes(inputs, objects, run);
+  } else {
+    const RenderVolume read =
+        readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
+    extent = extentOf(read);
+    if (!picture.extinction) extent.typicalDensity = read.typicalDensity();
+  }
+  extent.outline = picture.outermost(extent.outline);
+  return extent;
+}
+
+void SceneOptions::addTo(PictureOptions& picture, const RenderVolume& volume, const Run& run) const {
+  objects.addTo(picture, volume, run.memoryLimitBytes);
+  if (deep.empty()) return;
+  picture.render.deep.emplace();
+  if (picture.adaptiveThreshold > 0)
+    refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
+  picture.render.adaptiveThreshold = 0;
+}
+
+void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs) {
+  app.add_option("input", options.inputs, inputs)->required()->type_name("FILE");
+}
+
+void addSceneOptions(CLI::App& app, SceneOptions& options, OutputTrial trial) {
+  addOutput(app, "--deep", options.deep, {".exr"},
+            "The picture with depth: samples that give the picture when they are flattened.", trial);
+  app.add_option(
+         "--holdout", options.holdout,
+         "Deep picture (.exr) of what stands in front, for the same camera: of what is behind it only "
+         "the share is kept that it lets through.")
+      ->type_name("FILE");
+  addObjectOptions(app, options.objects);
+}
+
+}  // namespace nephele::apps

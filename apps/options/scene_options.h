@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/options/object_options.h"
+#include "apps/options/render_options.h"
+
+namespace nephele::apps {
+
+/// What is in a picture, beside the options of how it is seen: volumes, objects, and what hides them.
+struct SceneOptions {
+  std::vector<std::string> inputs;
+  ObjectOptions objects;
+  /// Deep pictures: one to be written, and one of what stands in front. "" where there is none.
+  std::string deep, holdout;
+
+  /// Reads the inputs as they are marched, all as one; notes where that is empty. @throws as readVolumes.
+  RenderVolume volume(const PictureOptions& picture, Run& run) const;
+  /// How large the inputs are, for sequences: volumes, or shapes alone. @throws Error naming the file.
+  Extent extent(const PictureOptions& picture, Run& run) const;
+  /// Puts the objects into `picture`, which is resolved, and that it is to have depth. @throws CLI::Error for
+  /// options that do not fit together, Error naming the file of an object.
+  void addTo(PictureOptions& picture, const RenderVolume& volume, const Run& run) const;
+};
+
+/// Declares the inputs on `app`, described by `inputs`.
+void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs);
+/// Declares --deep, --holdout and the options of objects.
+void addSceneOptions(CLI::App& app, SceneOptions& options, OutputTrial trial = OutputTrial::program);
+
+}  // namespace nephele::apps

@@ -1,0 +1,107 @@
+#include "apps/options_digest.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "apps/app.h"
+#include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/render/image/image_file.h"
+
+namespace nephele::apps {
+namespace {
+
+/// A 64 bit FNV-1a hash.
+class Hash {
+ public:
+  void add(std::string_view bytes) {
+    for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
+    // So that "ab", "c" and "a", "bc" differ.
+    value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
+  }
+  /// A file by what it holds, wherever it is.
+  void addFile(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::vector<char> block(std::size_t(1) << 20);
+    while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
+      add({block.data(), std::size_t(file.gcount())});
+  }
+  std::string text() const { return fmt::format("{:016x}", value_); }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+/// How the program runs. What --config and --look set counts as if it were typed.
+constexpr std::string_view kHow[]{"config",       "look",           "skip-existing", "threads",
+                                  "memory-limit", "display-server", "quiet",         "verbose",
+                                  "progress",     "overwrite",      "help"};
+
+std::string digestOfPicture(const std::string& path) {
+  std::string digest;
+  const detail::ImageReader reader{[&](const detail::ImageHeader& header) {
+                                     for (const auto& [name, value] : header.attributes)
+                                       if (name == kPartDigest) digest = value;
+                                   },
+                                   [](int, const float*) {},
+                                   [](std::span<const unsigned>, std::span<const std::vector<float>>) {}};
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  extension == ".png" ? detail::readPngFile(path, reader) : detail::readExrFile(path, reader);
+  return digest;
+}
+
+std::string digestOfVolume(const std::string& path) {
+  const std::vector<VdbGrid> grids = readVdbFile(path);
+  return grids.empty() ? "" : metadataOf(grids.front(), kPartDigest).value_or("");
+}
+
+}  // namespace
+
+std::string optionsDigest(const CLI::App& app, std::span<const std::string_view> others,
+                          const std::string& more) {
+  Hash hash;
+  hash.add(NEPHELE_VERSION);
+  hash.add(app.get_name());
+  hash.add(more);
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string name = option->get_single_name();
+    if (option->count() == 0 || isOutput(*option) || std::ranges::count(others, name) > 0 ||
+        std::ranges::count(kHow, name) > 0)
+      continue;
+    hash.add(name);
+    for (const std::string& value : option->results()) {
+      std::error_code ignored;
+      const std::size_t equals = value.find('=');
+      const std::string rest = equals == std::string::npos ? value : value.substr(equals + 1);
+      const bool isFile = std::filesystem::is_regular_file(rest, ignored);
+      hash.add(isFile ? value.substr(0, value.size() - rest.size()) : value);
+      if (isFile) hash.addFile(rest);
+    }
+  }
+  return hash.text();
+}
+
+std::string outputDigest(const std::string& path) {
+  require(!std::filesystem::is_directory(path), path + ": is a folder");
+  if (isVolumeFile(path)) return digestOfVolume(path);
+  if (!isMeshFile(path)) return digestOfPicture(path);
+  static_cast<void>(readMesh(path));
+  return "";
+}
+
+std::string outputDefect(const std::string& path, const std::string& digest) {
+  try {
+    const std::string found = outputDigest(path);
+    return found == digest || isMeshFile(path) ? "" : kOtherDigest;
+  } catch (const Error& error) {
+    return fmt::format("is not whole ({})", error.what());
+  }
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,225 @@
+#include "apps/sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "apps/options/config_file.h"
+#include "nephele/levelset/io/output_file.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kForm = "a name with a place for the frame number, as in NAME.####.EXT";
+
+/// "4, 7-9, 12"
+std::string rangesOf(const std::vector<int>& frames) {
+  std::string text;
+  for (std::size_t i = 0, last = 0; i != frames.size(); i = last + 1) {
+    last = i;
+    while (last + 1 != frames.size() && frames[last + 1] == frames[last] + 1) ++last;
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", frames[i]);
+    if (last != i) text += fmt::format("-{}", frames[last]);
+  }
+  return text;
+}
+
+FrameRange parsedFrames(const std::string& option, const std::string& text) {
+  try {
+    return FrameRange::parse(text);
+  } catch (const Error& error) {
+    throw CLI::ValidationError(option, error.what());
+  }
+}
+
+std::vector<int> shardOf(const FrameRange& range, const std::string& text) {
+  int index = 0, count = 0;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, index);
+  const bool slash = first.ec == std::errc() && first.ptr != end && *first.ptr == '/';
+  const auto second = std::from_chars(slash ? first.ptr + 1 : end, end, count);
+  if (!slash || second.ec != std::errc() || second.ptr != end || index < 1 || count < index)
+    refuseValue("--shard", text, "I/N, machine I of N, with 1 <= I <= N");
+  return range.shard(index, count);
+}
+
+bool namesFile(const CLI::Option& option) {
+  return option.get_type_name().find("FILE") != std::string::npos;
+}
+
+/// "float grid 'density' of class 2": what must not change from frame to frame.
+struct GridKind {
+  std::string name, type;
+  VdbGridInfo::Class gridClass;
+  bool operator==(const GridKind&) const = default;
+};
+
+struct Grids {
+  std::optional<GridKind> firstScalar;
+  std::vector<std::string> names;
+  Vec3f voxelSize{};
+
+  explicit Grids(const std::string& path) {
+    for (const VdbGrid& grid : readVdbHeaders(path)) {
+      const VdbGridInfo info = describe(grid);
+      names.push_back(info.name);
+      if (firstScalar || valuesOf(grid) != VdbValues::scalar) continue;
+      firstScalar = GridKind{info.name, info.type, info.gridClass};
+      voxelSize = info.voxelSize;
+    }
+    std::ranges::sort(names);
+  }
+  std::string text() const {
+    return names.empty() ? "no grid" : fmt::format("'{}'", fmt::join(names, "', '"));
+  }
+};
+
+}  // namespace
+
+std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, const std::string& shard) {
+  std::vector<int> numbers = shard.empty() ? range.frames() : shardOf(range, shard);
+  if (only.empty()) return numbers;
+  const FrameRange part = parsedFrames("--only", only);
+  std::erase_if(numbers, [&](int number) { return !part.contains(number); });
+  return numbers;
+}
+
+std::optional<Sequence> Sequence::of(const std::vector<std::string>& arguments) {
+  if (!givenTo("--frames", arguments)) return std::nullopt;
+  return Sequence(arguments);
+}
+
+Sequence::Sequence(std::vector<std::string> arguments)
+    : arguments_(std::move(arguments)),
+      range_(parsedFrames("--frames", *givenTo("--frames", arguments_))),
+      chosen_(chosenFrames(range_, givenTo("--only", arguments_).value_or(""),
+                           givenTo("--shard", arguments_).value_or(""))) {
+  for (std::size_t i = 0; i != arguments_.size(); ++i) try {
+      if (FramePattern::places(arguments_[i]) > 0) words_.push_back({i, FramePattern::parse(arguments_[i])});
+    } catch (const Error& error) {
+      throw CLI::ValidationError("--frames", error.what());
+    }
+  if (words_.empty()) throw CLI::ValidationError("--frames", fmt::format("no file has {}", kForm));
+}
+
+std::vector<std::size_t> Sequence::made() const {
+  std::vector<std::size_t> indices;
+  for (const int frame : chosen_)
+    indices.push_back(
+        std::size_t(std::ranges::lower_bound(range_.frames(), frame) - range_.frames().begin()));
+  return indices;
+}
+
+Call Sequence::call(std::size_t index) const {
+  const int frame = range_.frames()[index];
+  Call call{fmt::format("frame {}", frame),
+            {.frame = frame, .framesSinceFirst = frame - range_.first()},
+            arguments_};
+  for (const Word& word : words_) call.arguments[word.index] = word.pattern.path(frame);
+  return call;
+}
+
+const Sequence::Word* Sequence::wordOf(const std::string& value) const {
+  for (const Word& word : words_)
+    if (const std::string text = word.pattern.path(range_.frames().front()); text.ends_with(value))
+      if (value.size() == text.size() || text.starts_with('-')) return &word;
+  return nullptr;
+}
+
+std::vector<Sequence::File> Sequence::inputs(const CLI::App& first) const {
+  std::vector<File> result;
+  for (const CLI::Option* option : first.get_options()) {
+    if (!namesFile(*option) || isOutput(*option)) continue;
+    for (const std::string& value : option->results()) {
+      const Word* word = wordOf(value);
+      if (!word) continue;
+      // NAME=FILE
+      const std::size_t equals = fs::exists(value) ? std::string::npos : value.rfind('=');
+      const std::size_t length = value.size() - (equals == std::string::npos ? 0 : equals + 1);
+      result.push_back({word, word->pattern.path(range_.frames().front()).size() - length});
+    }
+  }
+  return result;
+}
+
+void Sequence::requireNumberedOutputs(const CLI::App& first) const {
+  for (const CLI::Option* option : first.get_options()) {
+    if (!isOutput(*option) || option->check_lname("stats") || option->check_lname("contact-sheet")) continue;
+    for (const std::string& value : option->results())
+      if (!isStream(value) && !wordOf(value)) refuseValue(option->get_name(false, true), value, kForm);
+  }
+}
+
+void Sequence::requireFiles(const File& file) const {
+  std::vector<int> missing;
+  for (const int frame : range_.frames())
+    if (!fs::exists(file.path(frame))) missing.push_back(frame);
+  if (missing.empty()) return;
+  const std::string name = file.word->pattern.text().substr(file.start);
+  throw Error(fmt::format("{}: {} of {} frames {} missing: {}", name, missing.size(), size(),
+                          missing.size() == 1 ? "is" : "are", rangesOf(missing)));
+}
+
+void Sequence::requireSameGrids(const File& file, const Run& run) const {
+  const std::string firstPath = file.path(range_.frames().front());
+  if (!isVolumeFile(firstPath)) return;
+  const Grids first(firstPath);
+  bool isNoted = false;
+  for (const int frame : range_.frames()) {
+    run.check();
+    const std::string path = file.path(frame);
+    const Grids other(path);
+    if (other.firstScalar != first.firstScalar)
+      throw Error(fmt::format("{}: its grids are {}, and those of {} are {}: frames must hold the same", path,
+                              other.text(), firstPath, first.text()));
+    const bool differs = other.names != first.names || other.voxelSize != first.voxelSize;
+    if (differs && !isNoted)
+      run.note(other.names != first.names
+                   ? fmt::format("{}: its grids are {}, and those of {} are {}", path, other.text(),
+                                 firstPath, first.text())
+                   : fmt::format("{}: its voxels are {:g} wide, and those of {} {:g}", path,
+                                 other.voxelSize.x, firstPath, first.voxelSize.x));
+    isNoted = isNoted || differs;
+  }
+}
+
+void Sequence::check(const CLI::App& first, const Run& run) const {
+  requireNumberedOutputs(first);
+  const std::vector<File> files = inputs(first);
+  for (const File& file : files) requireFiles(file);
+  for (const File& file : files) requireSameGrids(file, run);
+  for (const CLI::Option* option : first.get_options())
+    for (const std::string& value : option->results())
+      if (isOutput(*option) && wordOf(value)) {
+        const bool isNamed = option->get_type_name().starts_with("[NAME=]");
+        const fs::path folder = fs::path(isNamed ? value.substr(value.find('=') + 1) : value).parent_path();
+        std::error_code error;
+        if (!folder.empty()) fs::create_directories(folder, error);
+        require(!error,
+                fmt::format("cannot write {}: the folder cannot be made: {}", value, error.message()));
+      }
+}
+
+void refuseFrameNames(const CLI::App& app) {
+  if (app.get_option_no_throw("--frames")->count() > 0) return;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!namesFile(*option) && !isOutput(*option)) continue;
+    for (const std::string& value : option->results()) {
+      // Other signs are as good letters as any.
+      const bool isPattern = FramePattern::places(value) == 1 &&
+                             (value.find("##") != std::string::npos || value.find("%0") != std::string::npos);
+      if (isPattern && (isOutput(*option) || !fs::exists(value)))
+        throw CLI::ValidationError(
+            option->get_name(false, true),
+            fmt::format("got '{}', which names frames; say which, as in --frames 1-48", value));
+    }
+  }
+}
+
+}  // namespace nephele::apps

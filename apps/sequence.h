@@ -1,0 +1,80 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/app.h"
+#include "nephele/render/image/frame_range.h"
+
+namespace nephele::apps {
+
+/// The frames of `range` that are in `only`, and of these the share I/N of `shard`, each where it is not "".
+/// @throws CLI::ValidationError naming --only or --shard.
+std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, const std::string& shard);
+
+/// One of the calls that a command line stands for.
+struct Call {
+  /// "frame 12"
+  std::string name;
+  Run::Part part;
+  std::vector<std::string> arguments;
+};
+
+/// A command line that stands for one call for each of its --frames: every argument with a place for the
+/// frame number (####, %04d, $F4) has the number there.
+/// --only and --shard say which of them this call makes.
+class Sequence {
+ public:
+  /// Nothing where `arguments` have no --frames. @throws CLI::ValidationError naming what is wrong: the
+  /// frames, no argument with a place for their number, or one with two.
+  static std::optional<Sequence> of(const std::vector<std::string>& arguments);
+
+  /// Of all frames, by an index below `size`.
+  Call call(std::size_t index) const;
+  std::size_t size() const { return range_.frames().size(); }
+  /// The indices of the frames to make.
+  std::vector<std::size_t> made() const;
+
+  /// Looks before the work whether it can be done, `first` being the options of the first call: outputs need
+  /// a place for the number, inputs must be there for every frame, and volumes hold the same grids. Makes the
+  /// folders of outputs.
+  /// @throws CLI::ValidationError naming the option, Error naming the frames that are missing, or the file.
+  void check(const CLI::App& first, const Run& run) const;
+
+  /// Whether an input differs from frame to frame.
+  bool variesInputs(const CLI::App& first) const { return !inputs(first).empty(); }
+
+ private:
+  /// An argument with a place for the number.
+  struct Word {
+    std::size_t index;
+    FramePattern pattern;
+  };
+  /// A file of every frame: the argument, and where in it the name of the file begins.
+  struct File {
+    const Word* word;
+    std::size_t start;
+    std::string path(int frame) const { return word->pattern.path(frame).substr(start); }
+  };
+
+  explicit Sequence(std::vector<std::string> arguments);
+  /// The word that `value` of an option comes from; null where it is the same in all frames.
+  const Word* wordOf(const std::string& value) const;
+  std::vector<File> inputs(const CLI::App& first) const;
+  void requireNumberedOutputs(const CLI::App& first) const;
+  void requireFiles(const File& file) const;
+  void requireSameGrids(const File& file, const Run& run) const;
+
+  std::vector<std::string> arguments_;
+  FrameRange range_;
+  std::vector<int> chosen_;
+  std::vector<Word> words_;
+};
+
+/// Refuses names with #### or %04d where there are no frames: of outputs, and of inputs that are not there.
+/// @throws CLI::ValidationError
+void refuseFrameNames(const CLI::App& app);
+
+}  // namespace nephele::apps
