@@ -16,7 +16,6 @@
 #include "nephele/render/image/contact_sheet.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
-#include "nephele/render/scene/backdrop.h"
 
 namespace nephele::apps {
 namespace {
@@ -158,8 +157,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       const FrameProgress progress(run, i, missing.size());
       const Camera camera = maker->camera(frame.number);
       RenderResult result = maker->make(frame.number, camera, progress);
-      if (options.objects.backdrop)
-        addBackdrop(result.image, camera, turntable.lights(picture.lights, frame.number));
+      picture.addSky(result.image, camera, turntable.lights(picture.lights, frame.number));
       live.complete(result.image);
       // Also where a frame has no work that would ask.
       run.check();

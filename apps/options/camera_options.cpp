@@ -37,7 +37,11 @@ void addPicture(CLI::App& app, CameraOptions& options) {
 void addPlace(CLI::App& app, CameraOptions& options) {
   CLI::Option* view =
       addNumbers(
-          app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360, [&options](const Vec3f& v) { options.view = v; },
+          app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360,
+          [&options](const Vec3f& v) {
+            options.view = v;
+            options.viewGiven = true;
+          },
           "Where the camera stands, in degrees, at the distance that frames the volume: azimuth from the "
           "front (+z) towards +x, elevation from the horizon.")
           ->default_str(fmt::format("{:g},{:g}", options.view.x, options.view.y));

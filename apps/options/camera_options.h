@@ -17,7 +17,8 @@ struct CameraOptions {
   Camera::Frame frame;
   /// Azimuth and elevation of a camera that frames the volume; `position` takes its place where it is given,
   /// `file` theirs.
-  Vec3f view{25, 5, 0};
+  Vec3f view{25, -4, 0};
+  bool viewGiven = false;
   std::optional<Vec3f> position, lookAt;
   Vec3f up{0, 1, 0};
   /// What is looked at: `view` frames its outline. Filled in by `placed`.

@@ -10,7 +10,6 @@
 #include "apps/options/colour_options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/light/deep_shadow.h"
-#include "nephele/render/scene/clear_sky.h"
 
 namespace nephele::apps {
 namespace {
@@ -80,23 +79,24 @@ DistantLight defaultSun() {
 
 void addSuns(CLI::App& app, LightOptions& options) {
   const std::string form = "none, or [NAME=]AZIMUTH,ELEVATION[,INTENSITY or ,R,G,B], intensities at least 0";
-  addRepeated(app, "--sun", "[NAME=]AZ,EL[,INTENSITY|,R,G,B]", form,
-              "Where sunlight comes from, in degrees as for --view, and its irradiance (else 3.6, or that of "
-              "--sky clear); may be given again. none: no sun.",
-              [&options, form](const std::string& name, const std::string& text) {
-                if (text == "none") return options.noSun = true;
-                Numbers numbers = parseNumbers("--sun", text, form);
-                auto& suns = options.lights.suns;
-                if (numbers.size() == 2) {
-                  options.sunsOfTheSky.push_back(suns.size());
-                  numbers.push_back(double(kSunIntensity));
-                }
-                const auto colour = colourFrom(numbers, 2);
-                if (!colour) return false;
-                suns.push_back(sunOf(nextName(name, "sun", suns.size()), numbers, *colour));
-                return true;
-              })
-      ->default_str("90,38,3.6");
+  addRepeated(
+      app, "--sun", "[NAME=]AZ,EL[,INTENSITY|,R,G,B]", form,
+      "Where sunlight comes from, in degrees as for --view, and its irradiance (else that of --sky clear, "
+      "or 3.6); may be given again. none: no sun.",
+      [&options, form](const std::string& name, const std::string& text) {
+        if (text == "none") return options.noSun = true;
+        Numbers numbers = parseNumbers("--sun", text, form);
+        auto& suns = options.lights.suns;
+        if (numbers.size() == 2) {
+          options.sunsOfTheSky.push_back(suns.size());
+          numbers.push_back(double(kSunIntensity));
+        }
+        const auto colour = colourFrom(numbers, 2);
+        if (!colour) return false;
+        suns.push_back(sunOf(nextName(name, "sun", suns.size()), numbers, *colour));
+        return true;
+      })
+      ->default_str("90,38");
 }
 
 std::size_t countOf(const Lights& lights, bool spots) {
@@ -229,7 +229,6 @@ std::optional<float> turbidityFrom(const std::string& text, const std::string& f
 }
 
 void addSky(CLI::App& app, LightOptions& options) {
-  const Vec3f& sky = options.lights.sky;
   app.add_option_function<std::string>(
          "--sky",
          [&options](const std::string& text) {
@@ -249,11 +248,12 @@ void addSky(CLI::App& app, LightOptions& options) {
            options.skyFile.clear();
            options.lights.sky = *colour;
          },
-         "Radiance of the sky, the same in all directions, or a map of all directions. clear: the sky that "
-         "belongs to the first sun, from noon to dusk, and suns without an irradiance get theirs; TURBIDITY "
-         "is its haze, 1 (none) to 10, 2.5 if not given.")
-      ->type_name("R,G,B|FILE|clear[:TURBIDITY]")
-      ->default_str(fmt::format("{:g},{:g},{:g}", sky.x, sky.y, sky.z));
+         "clear: the sky that belongs to the first sun, from noon to dusk, and suns without an irradiance "
+         "get "
+         "theirs; TURBIDITY is its haze, 1 (none) to 10, 2 if not given. Or a radiance, the same in all "
+         "directions, or a map of all directions.")
+      ->type_name("clear[:TURBIDITY]|R,G,B|FILE")
+      ->default_str("clear");
   app.add_option_function<std::string>(
          "--ground-albedo",
          [&options](const std::string& text) {
@@ -338,13 +338,14 @@ void LightOptions::setClearSky(const std::vector<std::size_t>& ofTheSky, Lights&
     options.groundAlbedo = groundAlbedo;
     return ClearSky(options);
   };
-  const ClearSky first = skyOf(result.suns.empty() ? defaultSun().direction : result.suns.front().direction);
+  result.clear = std::make_shared<const ClearSky>(
+      skyOf(result.suns.empty() ? defaultSun().direction : result.suns.front().direction));
   for (const std::size_t i : ofTheSky) {
     DistantLight& sun = result.suns[i];
-    sun.irradiance = i == 0 ? first.sunlight() : skyOf(sun.direction).sunlight();
+    sun.irradiance = i == 0 ? result.clear->sunlight() : skyOf(sun.direction).sunlight();
   }
   result.map = std::make_shared<const Environment>(
-      first.map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
+      result.clear->map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
   result.sky = {};
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/app.h"
+#include "nephele/render/scene/clear_sky.h"
 #include "nephele/render/scene/environment.h"
 #include "nephele/render/scene/lights.h"
 #include "nephele/render/scene/medium.h"
@@ -23,7 +24,7 @@ struct LightOptions {
     float start = 0;
   };
 
-  Lights lights{{}, {0.10f, 0.17f, 0.28f}};
+  Lights lights;
   bool noSun = false;
   Said<DecayFrom> decays;
   Said<Vec3f> shadows;
@@ -31,15 +32,15 @@ struct LightOptions {
   float deepTolerance = 2e-3f;
   /// Files to take a light's shadow from, and to write it to.
   Said<std::string> readShadows, writtenShadows;
-  /// A sky from a file, or a clear one of some haze over some ground.
+  /// A sky from a file, or a clear one of some haze over some ground; else lights.sky.
   std::string skyFile;
-  std::optional<float> turbidity;
+  std::optional<float> turbidity = ClearSky::Options{}.turbidity;
   Vec3f groundAlbedo{0.2f, 0.2f, 0.2f};
   /// Numbers of suns whose irradiance is that of the clear sky, if there is one.
   std::vector<std::size_t> sunsOfTheSky;
   Environment::Options sky;
 
-  /// The lights of the picture; one sun where no light is given but a sky of one colour. Reads the sky's map.
+  /// The lights of the picture; one sun where no light is given but a sky without a map. Reads the sky's map.
   /// @throws Error if a name is unknown or taken twice, or a file cannot be read.
   Lights resolved(double mostBytes) const;
   /// Whether a density that is coded is enough for them all.

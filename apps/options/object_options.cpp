@@ -62,8 +62,11 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
       ->type_name("FILE");
   addColourEncoding(app, "--texture-encoding", options.textureEncoding,
                     "How its numbers stand for light; auto: as the file says.");
-  app.add_flag("--backdrop", options.backdrop,
-               "A sky behind the preview, as the layer backdrop: that of --sky FILE, or a gradient.");
+  app.add_flag_function(
+         "--backdrop,!--no-backdrop", [&options](std::int64_t count) { options.backdrop = count > 0; },
+         "The sky behind previews, as the layer backdrop: that of --sky clear or of a map, or a gradient; or "
+         "none.")
+      ->default_str("with --sky clear, unless there is a --background");
   CLI::Option* ground = app.add_flag("--ground", options.ground,
                                      "A plane below the volume, in its shadow, as wide as can be seen.");
   addOptional(app, "--ground-height", options.groundHeight, -1e9, 1e9,
@@ -97,13 +100,20 @@ std::vector<SurfaceObject> ObjectOptions::shapes(const std::vector<std::string>&
   return painted(*this, paths, {0.62f, 0.6f, 0.57f}, mostBytes);
 }
 
-void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const {
+void ObjectOptions::lift(CameraOptions& camera) const {
+  constexpr float kElevation = 5;
+  if (ground && !camera.viewGiven) camera.view.y = kElevation;
+}
+
+void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown,
+                          double mostBytes) const {
   const std::pair<const char*, bool> ofObjects[] = {
       {"--object-color", colour.has_value()}, {"--checker", checkers > 0}, {"--texture", !texture.empty()}};
   for (const auto& [option, isGiven] : ofObjects)
     if (isGiven && objects.empty())
       throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");
   picture.render.surfaces = surfaces(volume, picture.seen, mostBytes);
+  picture.backdrop = backdrop.value_or(isShown && picture.lights.clear && !picture.background);
 }
 
 }  // namespace nephele::apps

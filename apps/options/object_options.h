@@ -20,7 +20,9 @@ struct ObjectOptions {
   int checkers = 0;
   std::string texture;
   ColourEncoding textureEncoding = ColourEncoding::automatic;
-  bool ground = false, backdrop = false;
+  bool ground = false;
+  /// Where it is not given, previews show a clear sky.
+  std::optional<bool> backdrop;
   /// Height of the ground; the bottom of the volume if not given.
   std::optional<double> groundHeight;
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
@@ -32,9 +34,11 @@ struct ObjectOptions {
   /// naming the file.
   std::shared_ptr<const Surfaces> surfaces(const RenderVolume& volume, const Extent& seen,
                                            double mostBytes) const;
-  /// Puts them into `picture`, which is resolved. @throws CLI::Error for options of objects where there are
-  /// none, Error as `surfaces`.
-  void addTo(PictureOptions& picture, const RenderVolume& volume, double mostBytes) const;
+  /// Cameras stand above the ground, where no --view says otherwise.
+  void lift(CameraOptions& camera) const;
+  /// Puts them into `picture`, which is resolved, and is shown on screens, too, or not. @throws CLI::Error
+  /// for options of objects where there are none, Error as `surfaces`.
+  void addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown, double mostBytes) const;
 };
 
 /// Declares the options on `app`.

@@ -7,6 +7,8 @@
 
 #include "apps/options/live_picture.h"
 #include "nephele/render/march/film.h"
+#include "nephele/render/scene/aerial_perspective.h"
+#include "nephele/render/scene/backdrop.h"
 
 namespace nephele::apps {
 namespace {
@@ -29,7 +31,11 @@ void addMedium(CLI::App& app, PictureOptions& options) {
       ->type_name("NUMBER")
       ->default_str("150 / longest side of the volume");
   addNumbers(
-      app, "--albedo", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.medium.albedo = v; },
+      app, "--albedo", "R,G,B", 3, 0, 1,
+      [&options](const Vec3f& v) {
+        options.medium.albedo = v;
+        options.albedoGiven = true;
+      },
       "Share of the light met that is scattered.")
       ->default_str(fmt::format("{:g},{:g},{:g}", options.medium.albedo.x, options.medium.albedo.y,
                                 options.medium.albedo.z));
@@ -41,6 +47,7 @@ void addMedium(CLI::App& app, PictureOptions& options) {
   app.add_option_function<std::string>(
          "--phase",
          [&options](const std::string& text) {
+           options.phaseGiven = true;
            try {
              options.medium.phase = Phase::parse(text);
            } catch (const Error&) {
@@ -86,6 +93,7 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   addCameraOptions(app, options);
   addLightOptions(app, options.light);
   addMedium(app, options);
+  addScaleOptions(app, options.scale);
   addChoice<Quality>(
       app, "--quality", options.quality,
       {{"draft", Quality::draft}, {"good", Quality::good}, {"final", Quality::final}},
@@ -142,10 +150,7 @@ Extent extentOf(const RenderVolume& volume) {
 PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& run) const {
   PictureOptions result = *this;
   static_cast<CameraOptions&>(result) = placed(extentOf(volume), run);
-  if (!extinction)
-    result.extinction = run.part && run.part->range
-                            ? defaultExtinction(float(result.seen.longestSide), result.seen.typicalDensity)
-                            : defaultExtinction(volume);
+  result.chooseByScale(volume, run);
   result.medium.extinction = *result.extinction;
   if (step.value > 0) result.render.step = stepIn(volume, step, result.seen.longestSide);
   if (adaptiveThreshold > 0 && pathTraced)
@@ -156,6 +161,12 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");
+  if (scale.aerialPerspective) {
+    if (!result.lights.clear)
+      throw CLI::ValidationError("--aerial-perspective", "needs the air of --sky clear");
+    result.dropsMeanDepth_ = std::ranges::count(result.render.aovs, "Z_mean") == 0;
+    if (result.dropsMeanDepth_) result.render.aovs.push_back("Z_mean");
+  }
   result.render.shutter = shutter;
   result.volumeFlows = !volumes.velocityGrids.empty();
   result.render.volumeMotion = result.motion();
@@ -163,6 +174,21 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
     result.render.nextCamera = result.laterCamera(1);
   result.render.seed = std::uint32_t(seed);
   return result;
+}
+
+void PictureOptions::chooseByScale(const RenderVolume& volume, const Run& run) {
+  if (!extinction) {
+    const bool isInRange = run.part && run.part->range;
+    const float density = isInRange ? seen.typicalDensity : volume.typicalDensity();
+    if (scale.longestSide && !volume.isEmpty())
+      extinction = RealCloud::kExtinction * scale.metresPerUnit(seen.longestSide) / std::max(density, 1.0f);
+    else
+      extinction =
+          isInRange ? defaultExtinction(float(seen.longestSide), density) : defaultExtinction(volume);
+  }
+  if (!scale.longestSide) return;
+  if (!albedoGiven) medium.albedo = Vec3f{1, 1, 1} * RealCloud::kAlbedo;
+  if (!phaseGiven) medium.phase = Phase::parse(fmt::format("mie:{:g}", RealCloud::kDiameter));
 }
 
 void PictureOptions::chooseByQuality(const RenderVolume& volume) {
@@ -207,6 +233,14 @@ RenderResult PictureOptions::picture(const RenderVolume& volume, const Camera& c
                                      const Progress& progress) const {
   if (pathTraced) return pathTraceImage(volume, medium, lights, camera, traced(), progress);
   return renderImage(volume, medium, lights, camera, marched(camera), progress);
+}
+
+void PictureOptions::addSky(Image& image, const Camera& camera, const Lights& its) const {
+  if (backdrop) addBackdrop(image, camera, its);
+  if (!scale.aerialPerspective) return;
+  addAir(image, camera, {*its.clear, scale.metresPerUnit(seen.longestSide), light.sky.intensity});
+  if (dropsMeanDepth_)
+    std::erase_if(image.channels, [](const Image::Channel& channel) { return channel.name == "Z_mean"; });
 }
 
 std::map<std::string, std::string> PictureOptions::metadata(const Run& run) const {

@@ -9,6 +9,7 @@
 #include "apps/options/camera_options.h"
 #include "apps/options/light_options.h"
 #include "apps/options/quality_options.h"
+#include "apps/options/scale_options.h"
 #include "apps/options/view_options.h"
 #include "apps/options/volume_options.h"
 #include "nephele/render/image/display_server.h"
@@ -25,6 +26,9 @@ struct PictureOptions : CameraOptions {
   /// Made from `light` by `resolved`.
   Lights lights;
   Medium medium;
+  /// Of the medium, that of clouds of `scale` if not given.
+  bool albedoGiven = false, phaseGiven = false;
+  ScaleOptions scale;
   /// Of the volume if not given, see defaultExtinction.
   std::optional<float> extinction;
   Length step;
@@ -43,8 +47,9 @@ struct PictureOptions : CameraOptions {
   /// Made from `view` by `withView`.
   ViewTransform screen;
   std::optional<DisplayServer::Options> displayServer;
-  /// Behind the preview; the sky's radiance if not given.
+  /// Behind the preview, where there is no backdrop; the sky's mean radiance if not given.
   std::optional<Vec3f> background;
+  bool backdrop = false;
 
   /// These options with `screen` filled in, by `otherwise` where no view was asked for.
   /// @throws CLI::ValidationError or Error if there is no such view.
@@ -63,11 +68,17 @@ struct PictureOptions : CameraOptions {
   double estimateBytes(const RenderVolume& volume, const Camera& camera) const;
   /// Marches or path traces; `resolved` comes first.
   RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
+  /// Puts the air before a picture that was made in these lights, and the backdrop behind it, where they are
+  /// wanted.
+  void addSky(Image& image, const Camera& camera, const Lights& its) const;
   /// What files say of a picture.
   std::map<std::string, std::string> metadata(const Run& run) const;
 
  private:
   void chooseByQuality(const RenderVolume& volume);
+  void chooseByScale(const RenderVolume& volume, const Run& run);
+  // For the air alone, and not asked for as a layer.
+  bool dropsMeanDepth_ = false;
 };
 
 /// Of a volume, without its typical density, which costs a pass over it.

@@ -23,12 +23,16 @@ Extent SceneOptions::extent(const PictureOptions& picture, Run& run) const {
     extent = extentOf(read);
     if (!picture.extinction) extent.typicalDensity = read.typicalDensity();
   }
-  extent.outline = picture.outermost(extent.outline);
+  CameraOptions camera = picture;
+  objects.lift(camera);
+  extent.outline = camera.outermost(extent.outline);
   return extent;
 }
 
-void SceneOptions::addTo(PictureOptions& picture, const RenderVolume& volume, const Run& run) const {
-  objects.addTo(picture, volume, run.memoryLimitBytes);
+void SceneOptions::addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown,
+                         const Run& run) const {
+  objects.lift(picture);
+  objects.addTo(picture, volume, isShown, run.memoryLimitBytes);
   if (deep.empty()) return;
   picture.render.deep.emplace();
   if (picture.adaptiveThreshold > 0)

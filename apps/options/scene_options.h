@@ -19,9 +19,10 @@ struct SceneOptions {
   RenderVolume volume(const PictureOptions& picture, Run& run) const;
   /// How large the inputs are, for sequences: volumes, or shapes alone. @throws Error naming the file.
   Extent extent(const PictureOptions& picture, Run& run) const;
-  /// Puts the objects into `picture`, which is resolved, and that it is to have depth. @throws CLI::Error for
+  /// Puts the objects into `picture`, which is resolved and shown on screens, too, or not, and that it is to
+  /// have depth. @throws CLI::Error for
   /// options that do not fit together, Error naming the file of an object.
-  void addTo(PictureOptions& picture, const RenderVolume& volume, const Run& run) const;
+  void addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown, const Run& run) const;
 };
 
 /// Declares the inputs on `app`, described by `inputs`.

@@ -6,7 +6,6 @@
 #include "apps/options/shapes_picture.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
-#include "nephele/render/scene/backdrop.h"
 
 namespace nephele::apps {
 namespace {
@@ -28,6 +27,8 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
   addPictureOptions(app, options.picture);
   addShadowOutput(app, options.picture.light);
   addSceneOptions(app, options.scene);
+  // Air is put before deep pictures when they are merged.
+  app.get_option("--aerial-perspective")->excludes("--deep");
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
@@ -39,8 +40,8 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
                               options.files, run);
   RenderVolume volume = scene.volume(options.picture, run);
   picture = picture.resolved(volume, run);
+  scene.addTo(picture, volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();
-  scene.addTo(picture, volume, run);
   if (!scene.holdout.empty())
     picture.render.holdout = readHoldout(scene.holdout, camera, run.memoryLimitBytes);
   run.requireMemory(double(volume.memoryBytes()) + picture.estimateBytes(volume, camera),
@@ -49,7 +50,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   if (!picture.needsSamples()) volume.giveUpSamples();
   LivePicture live(picture.displayServer, options.files.output, picture.render);
   RenderResult result = picture.picture(volume, camera, run);
-  if (scene.objects.backdrop) addBackdrop(result.image, camera, picture.lights);
+  picture.addSky(result.image, camera, picture.lights);
   const auto metadata = picture.metadata(run);
   run.begin("write");
   if (result.deep)

@@ -67,7 +67,9 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
                   {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
   if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
   picture = picture.resolved(volume, run);
-  options.objects.addTo(picture, volume, run.memoryLimitBytes);
+  const bool isShown = !options.preview.empty() || !options.movie.empty() || !options.contactSheet.empty();
+  options.objects.lift(picture);
+  options.objects.addTo(picture, volume, isShown, run.memoryLimitBytes);
   const Camera start = firstCamera(options, picture);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.

@@ -10,6 +10,7 @@
 
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/deep_shadow.h"
+#include "nephele/render/light/detail/sky_parts.h"
 #include "nephele/render/volume/finer_density.h"
 
 namespace nephele::detail {
@@ -48,7 +49,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   setColours(volume, most);
   const bool grey = medium.albedo.x == medium.albedo.y && medium.albedo.x == medium.albedo.z;
   takeLights();
-  scene.colours = grey && !scene.isColoured() && !lights.map ? 1 : 3;
+  scene.colours = grey && !scene.isColoured() ? 1 : 3;
   const Vec3f corner(grid.firstBrick() * BrickGrid::kBrick);
   bounds = {volume.indexBounds().min - corner, volume.indexBounds().max - corner};
 
@@ -153,7 +154,6 @@ void BakedLight::takeLights() {
   distant = lights.suns;
   const std::size_t skyLayer = lights.suns.size() + lights.locals.size();
   for (std::size_t i = 0; i != distant.size(); ++i) layers.push_back(i);
-  skyGain = lights.sky;
   if (lights.map) {
     Environment map = *lights.map;
     for (DistantLight& spot : map.takeSpots(MarchScene::kMostSuns - int(Lights::kMost))) {
@@ -162,7 +162,6 @@ void BakedLight::takeLights() {
       layers.push_back(skyLayer);
     }
     sky = map;
-    skyGain = {1, 1, 1};
   }
   for (const DistantLight& sun : distant) gains.push_back(sun.irradiance);
   for (std::size_t i = 0; i != lights.locals.size(); ++i) {
@@ -235,37 +234,33 @@ void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
   for (int n = 0; n != scene.octaves; ++n) scene.attenuation[n] = forward.attenuation(n);
   const std::size_t lightCount = suns.size() + locals.size(), colours = std::size_t(scene.colours);
   const auto shadowOf = [&](std::size_t light) {
-    return light < suns.size()  ? distant[light].shadow
-           : light < lightCount ? lights.locals[light - suns.size()].shadow
-                                : Vec3f{1, 1, 1};
+    return light < suns.size() ? distant[light].shadow : lights.locals[light - suns.size()].shadow;
   };
   std::vector<Solve> solves;
   // For every light and colour that of `solves` which gives its part.
-  std::vector<std::optional<std::size_t>> from((lightCount + 1) * colours);
-  scattered.assign(from.size(), nullptr);
-  for (std::size_t light = 0; light <= lightCount; ++light) {
-    const bool isSky = light == lightCount;
-    if (isSky ? !lights.hasSky() : once) continue;
-    const bool isAsBefore = isSky && before && before->lights.sky == lights.sky && before->sky == sky &&
-                            before->scene.colours == scene.colours;
+  std::vector<std::optional<std::size_t>> from(lightCount * colours);
+  for (std::size_t light = 0; light != lightCount && !once; ++light)
     for (std::size_t c = 0; c != colours; ++c) {
-      const std::size_t place = light * colours + c;
-      if (isAsBefore) {
-        scattered[place] = before->scattered[before->scattered.size() - colours + c];
-        continue;
-      }
       const auto like = std::size_t(colourLike(int(c), shadowOf(light)));
-      if (like != c && !(isSky && sky)) {
-        from[place] = from[light * colours + like];
-        continue;
-      }
-      from[place] = solves.size();
-      solves.push_back({int(c), once ? 0 : meanAlbedo[int(c)],
-                        !isSky ? sourceOf(light, int(c))
-                        : sky  ? sourceOfSky(int(c))
-                               : ScatteredSource::evenSky()});
+      from[light * colours + c] = like == c ? solves.size() : from[light * colours + like];
+      if (like == c) solves.push_back({int(c), meanAlbedo[int(c)], sourceOf(light, int(c))});
     }
+  const std::vector<ScatteredSource> skies = partsOfSky();
+  scene.skyParts = int(skies.size());
+  const bool isSkyAsBefore = before && before->lights.sky == lights.sky && before->sky == sky &&
+                             before->scene.skyParts == scene.skyParts &&
+                             before->scene.colours == scene.colours;
+  for (std::size_t part = 0; part != skies.size(); ++part) {
+    from.emplace_back();
+    const int colour = colours == 1 ? 0 : int(part), like = sky ? colour : colourLike(colour, {1, 1, 1});
+    if (!lights.hasSky() || isSkyAsBefore) continue;
+    from.back() = like == colour ? solves.size() : from[lightCount * colours + std::size_t(like)];
+    if (like == colour) solves.push_back({colour, once ? 0 : meanAlbedo[colour], skies[part]});
   }
+  scattered.assign(from.size(), nullptr);
+  if (isSkyAsBefore)
+    std::copy(before->scattered.end() - scene.skyParts, before->scattered.end(),
+              scattered.end() - scene.skyParts);
   const std::size_t glowsFrom = solves.size();
   if (source->hasEmission() && !once && meanAlbedo != Vec3f{})
     for (int c = 0; c != scene.colours; ++c) solves.push_back({c, meanAlbedo[c], sourceOfGlow(c)});
@@ -347,13 +342,22 @@ ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
   return result;
 }
 
-ScatteredSource BakedLight::sourceOfSky(int colour) const {
-  ScatteredSource result;
-  result.sky = [this, colour](const std::vector<Vec3f>& towards) {
-    std::vector<float> inflow;
-    for (const Vec3f& radiance : sky->around(towards)) inflow.push_back(radiance[colour]);
-    return inflow;
-  };
+// Of the sky, and what multiplies them: its colours, or fewer where a grey medium does the same to all of
+// them.
+std::vector<ScatteredSource> BakedLight::partsOfSky() {
+  std::vector<ScatteredSource> result(std::size_t(scene.colours), ScatteredSource::evenSky());
+  if (!sky) {
+    skyGains = {lights.sky};
+    if (scene.colours == 3) skyGains = {{lights.sky.x, 0, 0}, {0, lights.sky.y, 0}, {0, 0, lights.sky.z}};
+    return result;
+  }
+  const std::vector<Vec3f> radiance = sky->around(ScatteredLight::skyDirections(*source, solver_));
+  const SkyParts parts = scene.colours == 3 ? coloursOfSky(radiance) : detail::partsOfSky(radiance);
+  skyGains = parts.colours;
+  result.resize(parts.values.size());
+  for (std::size_t part = 0; part != result.size(); ++part) {
+    result[part].sky = [values = parts.values[part]](const std::vector<Vec3f>&) { return values; };
+  }
   return result;
 }
 

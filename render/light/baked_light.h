@@ -46,7 +46,8 @@ struct BakedLight {
   std::vector<float> phaseTable;
   /// Of every result, suns, locals and sky: what multiplies it, and its place in Lights::names.
   std::vector<Vec3f> gains;
-  Vec3f skyGain;
+  /// Of every part of the sky.
+  std::vector<Vec3f> skyGains;
   std::vector<std::size_t> layers;
   /// As scene.scattered and scene.glow, which ViewLight makes of them; shared by colours that are alike.
   std::vector<std::shared_ptr<const ScatteredLight>> scattered, glow;
@@ -82,7 +83,7 @@ struct BakedLight {
   };
   void solve(std::vector<Solve>& solves, const Progress& progress) const;
   ScatteredSource sourceOf(std::size_t light, int colour) const;
-  ScatteredSource sourceOfSky(int colour) const;
+  std::vector<ScatteredSource> partsOfSky();
   ScatteredSource sourceOfGlow(int colour) const;
   int colourLike(int colour, const Vec3f& shadow) const;
 };

@@ -92,6 +92,13 @@ int ScatteredLight::Options::degree(const std::vector<float>& phase) const {
   return degree;
 }
 
+std::vector<Vec3f> ScatteredLight::skyDirections(const RenderVolume& volume, const Options& options) {
+  std::vector<Vec3f> towards;
+  for (const detail::Ordinate& ordinate : detail::levelSymmetric(options.order))
+    towards.push_back(normalize(volume.density().indexToWorld().linear * -ordinate.way));
+  return towards;
+}
+
 ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& scattering,
                                const ScatteredSource& source, const Options& options,
                                const Progress& progress) {
@@ -101,12 +108,7 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   detail::TransportSolver::Medium medium;
   medium.ordinates = detail::levelSymmetric(options.order);
   medium.inflow.assign(medium.ordinates.size(), 0.0f);
-  if (source.sky) {
-    std::vector<Vec3f> towards;
-    for (const detail::Ordinate& ordinate : medium.ordinates)
-      towards.push_back(normalize(grid.indexToWorld().linear * -ordinate.way));
-    medium.inflow = source.sky(towards);
-  }
+  if (source.sky) medium.inflow = source.sky(skyDirections(volume, options));
   sky_.assign(std::size_t(detail::momentCount(degree)), 0.0f);
   for (std::size_t i = 0; i != medium.ordinates.size(); ++i) {
     float y[detail::kMostMoments];

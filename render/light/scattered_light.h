@@ -80,6 +80,9 @@ class ScatteredLight {
     Options finerWhereDeep(const RenderVolume& volume, const Scattering& scattering) const;
   };
 
+  /// From where ScatteredSource::sky is asked for radiance.
+  static std::vector<Vec3f> skyDirections(const RenderVolume& volume, const Options& options);
+
   /// Cost: some 4 sweeps, each directions * nodes. @throws Error if an option is not useful or `scattering`
   /// is outside its range.
   ScatteredLight(const RenderVolume& volume, const Scattering& scattering, const ScatteredSource& source,

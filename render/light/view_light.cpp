@@ -36,6 +36,7 @@ ViewLight::ViewLight(const BakedLight& lit, const Viewpoint& viewpoint) {
     }
     return values;
   };
+  // The parts of a sky are colours, but where all colours are alike.
   for (std::size_t i = 0; i != lit.scattered.size(); ++i)
     scattered_.push_back(valuesOf(lit.scattered[i], int(i % std::size_t(lit.scene.colours))));
   for (std::size_t c = 0; c != lit.glow.size(); ++c) glow_.push_back(valuesOf(lit.glow[c], int(c)));

@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "nephele/modeling/base/error.h"
@@ -30,9 +32,10 @@ constexpr double kAirHeight = 8, kHazeHeight = 1.2, kOzoneMiddle = 25, kOzoneHal
 constexpr double kHazeAlbedo = 0.9, kHazeColour[3] = {0.759, 1, 1.337};
 // Of Cornette's and Shanks' phase function for haze.
 constexpr double kHazeCosine = 0.76;
-// The sun's colour outside of the atmosphere, seen by eyes that are used to daylight, times what gives its
-// light the luminance that ClearSky::sunlight states.
-constexpr double kSun[3] = {1.474 * 2.734, 1.8504 * 2.734, 1.91198 * 2.734};
+// The sun's light outside of the atmosphere, to a camera that is set to daylight: for a sun at 38 degrees, of
+// the standard turbidity and height, level ground gets grey light of sun and sky together, and of the sun
+// alone the luminance that ClearSky::sunlight states.
+constexpr double kSun[3] = {4.4178, 4.7231, 4.9358};
 constexpr double kSunRadius = 0.00466;
 
 using Colour = std::array<double, 3>;
@@ -42,19 +45,19 @@ double square(double x) {
 }
 
 // What is at a height.
-struct Air {
+struct AirThere {
   Colour air, haze, taken;
 };
 
 struct Atmosphere {
   double hazeExtinction;
 
-  Air at(double radius) const {
+  AirThere at(double radius) const {
     const double height = std::max(radius - kGround, 0.0);
     const double air = std::exp(-height / kAirHeight),
                  haze = std::exp(-height / kHazeHeight) * hazeExtinction,
                  ozone = std::max(0.0, 1 - std::fabs(height - kOzoneMiddle) / kOzoneHalf);
-    Air result;
+    AirThere result;
     for (std::size_t c = 0; c != 3; ++c) {
       result.air[c] = kAir[c] * air;
       result.haze[c] = kHazeAlbedo * kHazeColour[c] * haze;
@@ -128,7 +131,7 @@ class Transmittance {
         for (int i = 0; i != kSteps; ++i) {
           const double from = std::pow(double(i) / kSteps, 3), to = std::pow((i + 1.0) / kSteps, 3);
           for (const double point : kPoints) {
-            const Air air =
+            const AirThere air =
                 atmosphere.at(radiusAfter(radius, rise, lowest + part * (from + point * (to - from))));
             for (std::size_t c = 0; c != 3; ++c) depth[c] += air.taken[c] * std::fabs(part) * (to - from) / 2;
           }
@@ -163,21 +166,21 @@ struct Seen {
   bool isGround = false;
 };
 
-// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray.
+// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray, no farther than `most`.
 template <std::size_t kKinds, class Sources>
 Seen<kKinds> lookAlong(const Atmosphere& atmosphere, double radius, double rise, int steps,
-                       const Sources& sourcesAt) {
+                       const Sources& sourcesAt, double most = std::numeric_limits<double>::infinity()) {
   Seen<kKinds> seen;
   const double ground = wayToGround(radius, rise);
-  seen.isGround = ground >= 0;
-  seen.way = seen.isGround ? ground : wayToTop(radius, rise);
+  seen.isGround = ground >= 0 && ground <= most;
+  seen.way = std::min(ground >= 0 ? ground : wayToTop(radius, rise), most);
   double before = 0;
   for (int i = 0; i != steps; ++i) {
     // Shorter near the eye, where the air is densest.
     const double end = seen.way * square((i + 1.0) / steps), length = end - before,
                  way = before + 0.5 * length;
     const double there = radiusAfter(radius, rise, way);
-    const Air air = atmosphere.at(there);
+    const AirThere air = atmosphere.at(there);
     const std::array<Colour, kKinds> sources = sourcesAt(there, way, air);
     for (std::size_t c = 0; c != 3; ++c) {
       const double step = std::exp(-air.taken[c] * length),
@@ -247,7 +250,7 @@ struct ClearSky::Data {
         const double along = rise * sunRise + flat * sunFlat * std::cos(double(kPi) * (turn + 0.5) / kTurns);
         // What is scattered of the sun's light, and of light that is 1 everywhere.
         const auto seen =
-            lookAlong<2>(atmosphere, there, rise, kSteps, [&](double r, double way, const Air& air) {
+            lookAlong<2>(atmosphere, there, rise, kSteps, [&](double r, double way, const AirThere& air) {
               const Colour lit = transmittance.ofSun(r, riseAfter(there, sunRise, along, way, r));
               std::array<Colour, 2> sources;
               for (std::size_t c = 0; c != 3; ++c) {
@@ -273,22 +276,26 @@ struct ClearSky::Data {
   }
 
   // Of light over what the sun sends outside.
-  Seen<1> look(double from, const Vec3d& towards) const {
+  Seen<1> look(double from, const Vec3d& towards,
+               double most = std::numeric_limits<double>::infinity()) const {
     constexpr int kSteps = 24;
     const double along = dot(towards, sun), square1 = square(along);
     const double air = 3 / (16 * double(kPi)) * (1 + square1);
     constexpr double g = kHazeCosine;
     const double haze = 3 / (8 * double(kPi)) * (1 - g * g) * (1 + square1) /
                         ((2 + g * g) * std::pow(1 + g * g - 2 * g * along, 1.5));
-    return lookAlong<1>(atmosphere, from, towards.y, kSteps, [&](double r, double way, const Air& there) {
-      const double sunRise = riseAfter(from, sun.y, along, way, r);
-      const Colour lit = transmittance.ofSun(r, sunRise), before = scatteredBefore(r, sunRise);
-      Colour source;
-      for (std::size_t c = 0; c != 3; ++c)
-        source[c] =
-            (there.air[c] * air + there.haze[c] * haze) * lit[c] + (there.air[c] + there.haze[c]) * before[c];
-      return std::array<Colour, 1>{source};
-    });
+    return lookAlong<1>(
+        atmosphere, from, towards.y, kSteps,
+        [&](double r, double way, const AirThere& there) {
+          const double sunRise = riseAfter(from, sun.y, along, way, r);
+          const Colour lit = transmittance.ofSun(r, sunRise), before = scatteredBefore(r, sunRise);
+          Colour source;
+          for (std::size_t c = 0; c != 3; ++c)
+            source[c] = (there.air[c] * air + there.haze[c] * haze) * lit[c] +
+                        (there.air[c] + there.haze[c]) * before[c];
+          return std::array<Colour, 1>{source};
+        },
+        most);
   }
 };
 
@@ -323,6 +330,27 @@ Vec3f ClearSky::radiance(const Vec3f& towards) const {
                   (lit[c] * std::max(sunRise, 0.0) + data_->skyOnGround[c]);
   }
   return {float(kSun[0] * light[0]), float(kSun[1] * light[1]), float(kSun[2] * light[2])};
+}
+
+ClearSky::Air ClearSky::airBefore(const Vec3f& towards, float metres) const {
+  require(metres >= 0, fmt::format("sky: expected a distance of at least 0 metres, got {}", metres));
+  const Seen<1> seen = data_->look(data_->radius, normalize(Vec3d(towards)), double(metres) * 1e-3);
+  Air result;
+  for (std::size_t c = 0; c != 3; ++c) {
+    result.left[int(c)] = float(seen.left[c]);
+    result.light[int(c)] = float(kSun[c] * seen.light[0][c]);
+  }
+  return result;
+}
+
+ClearSky ClearSky::turned(double degrees) const {
+  ClearSky result = *this;
+  auto data = std::make_shared<Data>(*data_);
+  const double a = degrees * double(kPi) / 180, x = data->sun.x, z = data->sun.z;
+  data->sun.x = x * std::cos(a) + z * std::sin(a);
+  data->sun.z = z * std::cos(a) - x * std::sin(a);
+  result.data_ = std::move(data);
+  return result;
 }
 
 // The half to the left of the sun is that to its right.

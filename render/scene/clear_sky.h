@@ -20,7 +20,7 @@ class ClearSky {
     Vec3f sun{0, 1, 0};
     /// What air and haze take of a beam over what air alone does, at 550 nanometres: 1 is air without haze, 2
     /// to 3 a clear day, 6 and more hazy. 1 to 10.
-    float turbidity = 2.5f;
+    float turbidity = 2.0f;
     /// Of the ground, which lights clouds from below. 0 to 1.
     Vec3f groundAlbedo{0.2f, 0.2f, 0.2f};
     /// Of the observer above the ground, metres, 0 to 20 000.
@@ -36,6 +36,16 @@ class ClearSky {
   Vec3f sunlight() const;
   /// Radiance from a direction, of any length but zero: of the sky, or the ground behind its air.
   Vec3f radiance(const Vec3f& towards) const;
+  /// What the air before a place does to light that comes from there: so much of it is left, and light is
+  /// added.
+  struct Air {
+    Vec3f left{1, 1, 1}, light{};
+  };
+  /// Of a place in a direction, of any length but zero, and at a distance in metres; no farther than the
+  /// ground or where the atmosphere ends.
+  Air airBefore(const Vec3f& towards, float metres) const;
+  /// Turned by `degrees` about y, azimuths growing.
+  ClearSky turned(double degrees) const;
   /// The sky as a map of so many rows, even and at most 4096, its radiance times `intensity`. Uses all cores.
   Environment map(int rows = 96, float intensity = 1) const;
 

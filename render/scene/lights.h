@@ -11,6 +11,7 @@
 
 namespace nephele {
 
+class ClearSky;
 class Environment;
 class DeepShadowMap;
 
@@ -94,6 +95,8 @@ struct Lights {
   std::vector<LocalLight> locals{};
   /// Where given, the sky in place of `sky`.
   std::shared_ptr<const Environment> map{};
+  /// Of what `map` is a map, where it is a clear sky's; pictures may show its air, see addAir.
+  std::shared_ptr<const ClearSky> clear{};
 
   /// Shadows come from deep shadow maps, whose transmittance may be off by this, in place of sweeps. Only for
   /// the marcher, as DistantLight::deepShadow.

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/scene/clear_sky.h"
 #include "nephele/render/scene/environment.h"
 
 namespace nephele {
@@ -62,6 +63,7 @@ Lights Turntable::lights(const Lights& start, double frame) const {
   const double degrees = (orbit_ == Orbit::model ? -1 : 1) * degreesAt(frame);
   Lights result = start;
   if (start.map) result.map = std::make_shared<const Environment>(start.map->turned(degrees));
+  if (start.clear) result.clear = std::make_shared<const ClearSky>(start.clear->turned(degrees));
   for (DistantLight& sun : result.suns) {
     requireNoMap(sun.name, sun.deepShadow != nullptr);
     sun.direction = turned(sun.direction, degrees);

@@ -105,7 +105,7 @@ struct MarchScene {
   bool hasColouredShadow = false;
 
   /// Scattered light on dense lattices of `scatteredSize` nodes: `colours` of every sun in turn, then of the
-  /// locals and the sky; null where there is none. Empty if there is none at all.
+  /// locals, and `skyParts` of the sky; null where there is none. Empty if there is none at all.
   std::vector<const float*> scattered;
   Vec3i scatteredSize{};
 
@@ -114,6 +114,8 @@ struct MarchScene {
   float attenuation[kMostOctaves] = {1.0f};
   /// 1 where the albedo is grey, else 3.
   int colours = 1;
+  /// As `colours` where that is 3, else 1 to 3, see SkyParts.
+  int skyParts = 1;
 
   /// Longest step: `step`, `uniformStep` in bricks whose density hardly varies, or the width of a pixel if
   /// that is larger (up to 4 steps). Within a brick no more than an optical depth of `stepDepth` in its

@@ -150,7 +150,7 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
     for (int axis = 0; axis != 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, float(size[axis] - 1) - 1e-3f);
     std::size_t lattice = 0;
     for (std::size_t light = 0; light <= scene.lightCount(); ++light)
-      for (int c = 0; c != scene.colours; ++c)
+      for (int c = 0; c != (light < scene.lightCount() ? scene.colours : scene.skyParts); ++c)
         if (const float* values = scene.scattered[lattice++])
           (light < scene.lightCount() ? result.suns[light] : result.sky)[c] +=
               weight[c] * sample(values, p, size.x, size.x * size.y);

@@ -41,9 +41,10 @@ void DeepPixel::begin(std::size_t rayCount) {
 void DeepPixel::add(const MarchRay& ray, const MarchRecord& record, const Gains& gains) {
   const auto colourOf = [&](const MarchResult& light) {
     Vec3f colour;
+    for (std::size_t part = 0; part != gains.sky.size(); ++part) colour += light.sky[part] * gains.sky[part];
     for (int c = 0; c != 3; ++c) {
       const int from = gains.isGrey ? 0 : c;
-      colour[c] = light.emission[c] + gains.sky[c] * light.sky[from];
+      colour[c] += light.emission[c];
       for (std::size_t sun = 0; sun != gains.sunCount; ++sun)
         colour[c] += gains.suns[sun][c] * light.suns[sun][from];
     }

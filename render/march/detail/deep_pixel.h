@@ -23,8 +23,10 @@ class DeepPixel {
   /// Adds a ray's record. Colour of a ray is the sum of gain * light over its result's suns, sky and
   /// emission.
   struct Gains {
-    Vec3f suns[MarchScene::kMostLights], sky;
+    Vec3f suns[MarchScene::kMostLights];
     std::size_t sunCount = 0;
+    /// Of every part of it.
+    std::vector<Vec3f> sky{};
     bool isGrey = true;
   };
   void add(const MarchRay& ray, const MarchRecord& record, const Gains& gains);

@@ -295,8 +295,10 @@ class Marcher {
     std::size_t lattice = 0;
     if (!scene_.scattered.empty())
       for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
-        float* result = light < scene_.lightCount() ? result_.suns[light] : result_.sky;
-        for (int c = 0; c != scene_.colours; ++c)
+        const bool isSky = light == scene_.lightCount();
+        float* result = isSky ? result_.sky : result_.suns[light];
+        const int parts = isSky ? scene_.skyParts : scene_.colours;
+        for (int c = 0; c != parts; ++c)
           if (const float* values = scene_.scattered[lattice++]) add(values, c, result[c]);
       }
     if constexpr (kColours == 3)

@@ -91,7 +91,7 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
   shadowScene_.pixelAngle = 0;
   gains_.sunCount = lit.gains.size();
   for (std::size_t i = 0; i != gains_.sunCount; ++i) gains_.suns[i] = lit.gains[i];
-  gains_.sky = lit.skyGain;
+  gains_.sky = lit.skyGains;
   gains_.isGrey = scene_.colours == 1;
 }
 
@@ -251,8 +251,8 @@ std::uint64_t Picture::gather(int index, Scratch& scratch) const {
       for (int c = 0; c != 3; ++c)
         out.light[lit_.layers[light]][c] +=
             share * lit_.gains[light][c] * result.suns[light][scene_.colours == 1 ? 0 : c];
-    for (int c = 0; c != 3; ++c)
-      out.light[lit_.layers.back()][c] += share * lit_.skyGain[c] * result.sky[scene_.colours == 1 ? 0 : c];
+    for (std::size_t part = 0; part != lit_.skyGains.size(); ++part)
+      out.light[lit_.layers.back()] += share * result.sky[part] * lit_.skyGains[part];
     if (isDeep_) scratch.deep.add(rays[i], scratch.records[i], gains_);
     if (!surfaces_ || !scratch.hits[i]) continue;
     const auto& [world, sample] = scratch.seen[i];

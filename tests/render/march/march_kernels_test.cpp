@@ -36,7 +36,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   scene.scatteredSize = {5, 4, 2};
   scene.octaves = 5;
   for (int n = 0; n != 5; ++n) scene.attenuation[n] = 1.0f / float(1 + n);
-  scene.colours = 3;
+  scene.colours = scene.skyParts = 3;
   scene.step = 0.1f;
   scene.leastStep = 0.0125f;
 

@@ -255,7 +255,7 @@ TEST(NearLights, VectorsAgreeWithTheScalarLoop) {
   MarchScene scene = test::sceneOf(volume);
   scene.octaves = 2;
   scene.attenuation[1] = 0.4f;
-  scene.colours = 3;
+  scene.colours = scene.skyParts = 3;
   scene.step = 0.1f;
   scene.leastStep = 0.0125f;
   scene.extinction = 2;

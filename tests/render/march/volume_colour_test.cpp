@@ -263,7 +263,7 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
   set(volume.colour().scattering, scene.colour);
   set(volume.colour().emission, scene.emission);
   scene.extinctionColour[1] = 0.5f;
-  scene.colours = 3;
+  scene.colours = scene.skyParts = 3;
   std::vector<float> glowing(5 * 4 * 3);
   for (std::size_t i = 0; i != glowing.size(); ++i) glowing[i] = 0.5f + 0.4f * std::sin(float(i));
   const Affine toGlow{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
