@@ -30,7 +30,8 @@ FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
   }
   return {mesh,
           {.voxelSize = voxel(longestSide),
-           .reach = std::min(kHighest * rms, longestSide) + edgeThickness.largestInWorldUnits(longestSide)},
+           .reach = std::min(kHighest * rms, longestSide) + edgeThickness.largestInWorldUnits(longestSide),
+           .seed = seed},
           run};
 }
 

@@ -10,6 +10,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::apps {
@@ -52,10 +53,16 @@ FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run&
       longestSide_(run.longestSide(boundingBox(shape))) {}
 
 ScalarField FieldSources::field(const FieldValue& value) {
+  ScalarField result = rampOf(value);
+  for (const FieldValue& factor : value.factors) result = result * field(factor);
+  return result;
+}
+
+ScalarField FieldSources::rampOf(const FieldValue& value) {
   std::vector<RampStop> stops;
   for (const FieldValue::Stop& stop : value.stops)
     stops.push_back({float(stop.at), float(stop.amount.inWorldUnits(value.quantity.unit, longestSide_))});
-  if (value.isConstant()) return stops.front().value;
+  if (value.source == FieldValue::Source::constant) return stops.front().value;
   try {
     return ramp(placesOf(value), stops);
   } catch (const Cancelled&) {
@@ -68,6 +75,7 @@ ScalarField FieldSources::field(const FieldValue& value) {
 ScalarField FieldSources::placesOf(const FieldValue& value) {
   using Source = FieldValue::Source;
   if (value.source == Source::along) return along(value.direction);
+  if (value.source == Source::noise) return noise(value);
   const Vec3f& d = value.direction;
   const std::string key =
       value.source == Source::facing ? fmt::format("facing {} {} {}", d.x, d.y, d.z)
@@ -90,6 +98,14 @@ ScalarField FieldSources::along(const Vec3f& direction) const {
     high += std::max(a, b);
   }
   return plane(direction * float(low), direction) / float(high - low);
+}
+
+ScalarField FieldSources::noise(const FieldValue& value) const {
+  constexpr float kRms = 1.5f;
+  const auto frequency = float(value.frequency.inWorldUnits(Quantity::Unit::frequency, longestSide_));
+  return smoothstep(
+      -kRms, kRms,
+      fractalSum({.octaves = value.octaves, .frequency = frequency, .seed = std::uint32_t(options_.seed)}));
 }
 
 ScalarField FieldSources::facing(const Vec3f& direction) {

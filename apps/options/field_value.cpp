@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "nephele/levelset/io/vdb_io.h"
 
@@ -10,6 +11,9 @@ namespace nephele::apps {
 namespace {
 
 constexpr double kFarthestPlace = 1e6;
+constexpr int kMostOctaves = 8;
+// What fields may be multiplied by.
+constexpr Quantity kFactor{Quantity::Unit::number, 0, 1e6};
 
 /// The text before and after the first or last `separator`; the second is empty where there is none.
 std::pair<std::string, std::string> splitFirst(const std::string& text, char separator) {
@@ -43,11 +47,19 @@ class Parser {
   }
 
   FieldValue parsed() {
+    const auto [text, factors] = splitFirst(value_.text, '*');
+    readOne(text);
+    if (value_.text.find('*') != std::string::npos)
+      value_.factors.push_back(parseFieldValue(value_.option, factors, kFactor));
+    return value_;
+  }
+
+ private:
+  void readOne(const std::string& text) {
     using Source = FieldValue::Source;
-    const std::string& text = value_.text;
     if (text.find(':') == std::string::npos) {
       value_.stops = {{0, amount(text)}};
-      return value_;
+      return;
     }
     const auto [word, rest] = splitFirst(text, ':');
     if (word == "height") {
@@ -65,15 +77,17 @@ class Parser {
     } else if (word == "attribute") {
       value_.source = Source::attribute;
       readAttribute(rest);
+    } else if (word == "noise") {
+      value_.source = Source::noise;
+      readNoise(rest);
     } else {
-      const std::string meant = closestWord(word, {"height", "along", "facing", "mask", "attribute"});
-      refuse(value_.quantity.allowed() + ", or height:, along:, facing:, mask: or attribute:" +
+      const std::string meant =
+          closestWord(word, {"height", "along", "facing", "mask", "attribute", "noise"});
+      refuse(value_.quantity.allowed() + ", or height:, along:, facing:, mask:, attribute: or noise:" +
              (meant.empty() ? "" : "; did you mean " + meant + ":?"));
     }
-    return value_;
   }
 
- private:
   [[noreturn]] void refuse(const std::string& allowed) const {
     throw CLI::ValidationError(value_.option, fmt::format("got '{}', allowed: {}", value_.text, allowed));
   }
@@ -158,6 +172,24 @@ class Parser {
     readTwo(values);
   }
 
+  void readNoise(const std::string& rest) {
+    const auto [noise, values] = splitFirst(rest, ':');
+    const std::vector<std::string> parts = listed(noise);
+    const std::string frequency = parts.front();
+    value_.frequency.isRelative = frequency.ends_with('x');
+    const auto number =
+        parseNumber(frequency.substr(0, frequency.size() - (value_.frequency.isRelative ? 1 : 0)));
+    const auto octaves = parts.size() > 1 ? parseNumber(parts[1]) : std::optional<double>(value_.octaves);
+    if (parts.size() > 2 || !number || !(*number > 0 && *number <= 1e6) || !octaves ||
+        !(*octaves >= 1 && *octaves <= kMostOctaves) || *octaves != std::floor(*octaves))
+      refusePart(noise, fmt::format("a frequency above 0 (2.5 or 6x), and octaves from 1 to {}, as in "
+                                    "noise:3x,2:0.5,1",
+                                    kMostOctaves));
+    value_.frequency.value = *number;
+    value_.octaves = int(*octaves);
+    readTwo(values);
+  }
+
   FieldValue value_;
 };
 
@@ -187,12 +219,12 @@ double Amount::inWorldUnits(Quantity::Unit unit, double longestSide) const {
 }
 
 Amount FieldValue::largest(double longestSide) const {
-  return std::max_element(stops.begin(), stops.end(),
-                          [&](const Stop& a, const Stop& b) {
-                            return a.amount.inWorldUnits(quantity.unit, longestSide) <
-                                   b.amount.inWorldUnits(quantity.unit, longestSide);
-                          })
-      ->amount;
+  Amount result = std::max_element(stops.begin(), stops.end(), [&](const Stop& a, const Stop& b) {
+                    return a.amount.inWorldUnits(quantity.unit, longestSide) <
+                           b.amount.inWorldUnits(quantity.unit, longestSide);
+                  })->amount;
+  for (const FieldValue& factor : factors) result.value *= factor.largest(longestSide).value;
+  return result;
 }
 
 FieldValue parseFieldValue(const std::string& option, const std::string& text, const Quantity& quantity) {
@@ -218,7 +250,9 @@ std::string fieldValueHelp() {
          "X,Y,Z\n"
          "  mask:FILE.vdb[:GRID]:VALUE,VALUE      where a grid is 0, and where it is 1\n"
          "  attribute:NAME[:spheres]:VALUE,VALUE  where a vertex attribute of the mesh is 0, and where it is "
-         "1\n";
+         "1\n"
+         "  noise:FREQUENCY[,OCTAVES]:VALUE,VALUE where smooth noise is low, and where it is high\n"
+         "  FIELD*FIELD[*...]                     their product; all but the first are numbers\n";
 }
 
 }  // namespace nephele::apps

@@ -39,10 +39,11 @@ struct Amount {
 struct FieldValue {
   enum class Source {
     constant,
-    along,     ///< A ramp along `direction` over the box of the shape; "height" is one along y.
-    facing,    ///< A ramp over the cosine between the surface's normal and `direction`.
-    mask,      ///< A ramp over a grid.
-    attribute  ///< A ramp over a vertex attribute of the mesh.
+    along,      ///< A ramp along `direction` over the box of the shape; "height" is one along y.
+    facing,     ///< A ramp over the cosine between the surface's normal and `direction`.
+    mask,       ///< A ramp over a grid.
+    attribute,  ///< A ramp over a vertex attribute of the mesh.
+    noise       ///< A ramp over smooth noise, see FieldSources.
   };
   struct Stop {
     double at = 0;
@@ -61,9 +62,14 @@ struct FieldValue {
   /// Of an attribute.
   std::string attribute{};
   bool hasSpheres = false;
+  /// Of noise.
+  Amount frequency{};
+  int octaves = 3;
+  /// Numbers that multiply it.
+  std::vector<FieldValue> factors{};
 
-  bool isConstant() const { return source == Source::constant; }
-  /// The largest of its values on a shape with this longest side.
+  bool isConstant() const { return source == Source::constant && factors.empty(); }
+  /// The largest of its values on a shape with this longest side, or more where there are factors.
   Amount largest(double longestSide) const;
   double largestInWorldUnits(double longestSide) const {
     return largest(longestSide).inWorldUnits(quantity.unit, longestSide);

@@ -14,7 +14,7 @@ float luminance(const Vec3f& c) {
   return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z;
 }
 
-ClearSky skyAt(float elevation, float turbidity = 2.5f, float height = 1000) {
+ClearSky skyAt(float elevation, float turbidity = 2, float height = 1000) {
   ClearSky::Options options;
   options.sun = directionTowards(90, elevation);
   options.turbidity = turbidity;
@@ -39,6 +39,22 @@ TEST(ClearSky, TakesTwiceAsMuchAtThirtyDegrees) {
 
 TEST(ClearSky, SunHasItsLuminanceAtThirtyEightDegrees) {
   EXPECT_NEAR(luminance(skyAt(38).sunlight()), 3.6f, 0.04f);
+}
+
+TEST(ClearSky, LightsLevelGroundGreyAtThirtyEightDegrees) {
+  // By the midpoint rule in the square of the cosine.
+  const ClearSky sky = skyAt(38, 2);
+  Vec3f irradiance = sky.sunlight() * std::sin(radians(38.0f));
+  constexpr int kCount = 60;
+  for (int i = 0; i != kCount; ++i)
+    for (int j = 0; j != kCount; ++j) {
+      const float square = (float(i) + 0.5f) / kCount, up = std::sqrt(square), flat = std::sqrt(1 - square),
+                  turn = 2 * kPi * (float(j) + 0.5f) / kCount;
+      irradiance +=
+          sky.radiance({flat * std::cos(turn), up, flat * std::sin(turn)}) * (kPi / float(kCount * kCount));
+    }
+  EXPECT_NEAR(irradiance.x / irradiance.y, 1, 0.01);
+  EXPECT_NEAR(irradiance.z / irradiance.y, 1, 0.01);
 }
 
 TEST(ClearSky, SunGetsRedAndSets) {
