@@ -11,12 +11,14 @@
 #include <new>
 #include <span>
 
+#include "apps/detail/call_sheet.h"
 #include "apps/detail/command.h"
 #include "apps/detail/several_calls.h"
 #include "apps/options/config_file.h"
 #include "apps/options/first_day.h"
 #include "apps/options/old_names.h"
 #include "apps/sequence.h"
+#include "apps/wedge.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
 
@@ -103,30 +105,94 @@ std::vector<std::string> withFilesAfterDashes(std::vector<std::string> arguments
   return arguments;
 }
 
+std::vector<std::string> namesOf(const std::vector<Verb>& verbs) {
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs) names.push_back(verb.name);
+  return names;
+}
+
 bool given(const CLI::App& app, const char* name) {
   const CLI::Option* option = app.get_option_no_throw(name);
   return option && option->count() > 0;
 }
 
-/// What the command line asks for, with the options of its first call.
-void work(Command& command, const std::optional<Sequence>& sequence, ProgramRun& run) {
-  requireDistinctOutputs(command.app);
-  if (sequence)
-    sequence->check(command.app, run);
-  else
-    refuseFrameNames(command.app);
-  tryOutputs(command.app);
-  for (const char* option : {"--only", "--shard", "--skip-existing"})
-    if (!sequence && !command.hasOwnFrames() && given(command.app, option))
-      throw CLI::ValidationError(option, "is for several calls; give --frames");
-  if (!sequence) return command.bound.body(run);
-  makeCalls(command.verb,
-            {sequence->size(), [&](std::size_t i) { return sequence->call(i); }, sequence->made(),
-             sequence->variesInputs(command.app), "frames", command.options.skipExisting},
-            run);
+/// What a command line stands for: its arguments, and the calls that it makes of them.
+struct Line {
+  std::vector<std::string> arguments;
+  std::optional<Sequence> sequence;
+  std::optional<Wedge> wedge;
+  SeveralCalls calls{};
+
+  bool isSeveral() const { return sequence || wedge; }
+  std::vector<std::string> first() const { return isSeveral() ? calls.at(0).arguments : arguments; }
+};
+
+/// Options that a file or a look sets come behind those of `typed`.
+using WithSettings = std::function<std::vector<std::string>(std::vector<std::string> typed)>;
+
+Line lineOf(const Command& command, std::vector<std::string> typed, const WithSettings& withSettings) {
+  Line line;
+  if (!command.hasOwnFrames()) line.wedge = Wedge::taken(typed, command.app);
+  line.arguments = withSettings(typed);
+  const bool hasSheet = !command.hasOwnFrames() && givenTo("--contact-sheet", line.arguments);
+  if (!command.hasOwnFrames() && givenTo("--frames", line.arguments)) {
+    if (line.wedge) throw CLI::ValidationError("--wedge", "is for one frame; leave out --frames");
+    if (hasSheet) line.arguments = withPreview(line.arguments, command.app);
+    line.sequence = Sequence::of(line.arguments);
+    line.calls = {line.sequence->size(),
+                  [sequence = *line.sequence](std::size_t i) { return sequence.call(i); },
+                  line.sequence->made(), false, "frames"};
+  }
+  if (line.wedge) {
+    line.calls.count = line.wedge->size();
+    line.calls.list = "wedge";
+    // Densities that differ would be hidden by extinctions that suit each of them.
+    line.calls.variesInputs = command.app.get_option_no_throw("--extinction") != nullptr;
+    for (std::size_t i = 0; i != line.calls.count; ++i) line.calls.made.push_back(i);
+    line.calls.at = [=, &command, wedge = *line.wedge](std::size_t i) {
+      std::vector<std::string> own = wedge.arguments(i);
+      own.insert(own.begin(), typed.begin(), typed.end());
+      std::vector<std::string> all = withSettings(std::move(own));
+      if (hasSheet) all = withPreview(std::move(all), command.app);
+      return Call{wedge.label(i), {}, {{"values", wedge.values(i)}}, wedge.named(std::move(all), i, command.app)};
+    };
+  }
+  return line;
 }
 
-int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector<std::string> arguments,
+/// Looks before the work whether it can be done, with the options of the first call.
+void check(Command& command, const Line& line, const Run& run) {
+  requireDistinctOutputs(command.app);
+  if (line.sequence)
+    line.sequence->check(command.app, run);
+  else
+    refuseFrameNames(command.app);
+  for (std::size_t i = 1; line.wedge && i < line.calls.count; ++i)
+    Command(command.verb).parse(line.calls.at(i).arguments);
+  tryOutputs(command.app);
+  for (const char* option : {"--only", "--shard", "--skip-existing", "--contact-sheet"}) {
+    const bool isOfFrames = option == std::string_view("--only") || option == std::string_view("--shard");
+    if (!command.hasOwnFrames() && given(command.app, option) &&
+        !(isOfFrames ? line.sequence.has_value() : line.isSeveral()))
+      throw CLI::ValidationError(option, isOfFrames ? "is for sequences; give --frames"
+                                                    : "is for several calls; give --frames or --wedge");
+  }
+}
+
+/// What the command line asks for.
+void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramRun& run) {
+  check(command, line, run);
+  if (!line.isSeveral()) return command.bound.body(run);
+  const CommonOptions& options = command.options;
+  line.calls.skipExisting = options.skipExisting;
+  if (line.sequence) line.calls.variesInputs = line.sequence->variesInputs(command.app);
+  const std::vector<MadeCall> made = makeCalls(command.verb, line.calls, run);
+  if (options.contactSheet.empty()) return;
+  writeCallSheet(options.contactSheet, made, line.wedge ? line.wedge->columns() : std::nullopt,
+                 *std::ranges::find(verbs, "render", &Verb::name), run);
+}
+
+int runVerb(const Verb& verb, const std::vector<Verb>& verbs, std::vector<std::string> arguments,
             const std::string& commandLine) {
   Command command(verb);
   const CommonOptions& options = command.options;
@@ -135,20 +201,22 @@ int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector
     const auto note = [&](const std::string& sentence) {
       std::fputs((who + ": " + sentence + "\n").c_str(), stderr);
     };
+    const std::vector<std::string> names = namesOf(verbs);
+    const auto withSettings = [&](std::vector<std::string> typed) {
+      return withConfigFile({command.app, verb.name, names}, std::move(typed));
+    };
     arguments = withCurrentNames(verb.name, withFilesAfterDashes(std::move(arguments)), note);
-    const std::size_t typed = arguments.size();
-    arguments = withConfigFile({command.app, verb.name, verbs}, std::move(arguments));
-    const std::string configOptions = joined(std::span(arguments).subspan(typed));
-    const std::optional<Sequence> sequence = command.hasOwnFrames() ? std::nullopt : Sequence::of(arguments);
-    command.parse(sequence ? sequence->call(0).arguments : arguments);
+    Line line = lineOf(command, arguments, withSettings);
+    const std::vector<std::string> settings = withSettings(arguments);
+    command.parse(line.first());
     ProgramRun run(verb.name, options);
     run.commandLine = commandLine;
-    run.configOptions = configOptions;
+    run.configOptions = joined(std::span(settings).subspan(arguments.size()));
     const std::size_t threads =
         options.threads > 0 ? std::size_t(options.threads)
                             : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return runWork(who, run, options, [&] { work(command, sequence, run); });
+    return runWork(who, run, options, [&] { work(command, line, verbs, run); });
   } catch (const CLI::CallForAllHelp&) {
     std::cout << command.app.help();
     return 0;
@@ -164,9 +232,7 @@ int runVerb(const Verb& verb, const std::vector<std::string>& verbs, std::vector
 }
 
 int unknownVerb(const std::string& word, const std::vector<Verb>& verbs) {
-  std::vector<std::string> names;
-  for (const Verb& verb : verbs) names.push_back(verb.name);
-  const std::string meant = closestWord(word, names);
+  const std::string meant = closestWord(word, namesOf(verbs));
   return usageError("nephele", fmt::format("unknown verb '{}'{}", word,
                                            meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
 }
@@ -182,12 +248,10 @@ std::string overview(const std::vector<Verb>& verbs) {
 int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   installSignalHandlers();
   const std::string word = argc > 1 ? argv[1] : "--help";
-  std::vector<std::string> names;
-  for (const Verb& verb : verbs) names.push_back(verb.name);
   if (word == "help" && argc > 2) {
     const std::string asked = argv[2];
     for (const Verb& verb : verbs)
-      if (verb.name == asked) return runVerb(verb, names, {"--help"}, commandLineOf(argc, argv));
+      if (verb.name == asked) return runVerb(verb, verbs, {"--help"}, commandLineOf(argc, argv));
     return unknownVerb(asked, verbs);
   }
   if (word == "--help" || word == "-h" || word == "help") {
@@ -200,7 +264,7 @@ int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   }
   for (const Verb& verb : verbs)
     if (verb.name == word)
-      return runVerb(verb, names, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
+      return runVerb(verb, verbs, std::vector<std::string>(argv + 2, argv + argc), commandLineOf(argc, argv));
   return unknownVerb(word, verbs);
 }
 

@@ -120,6 +120,7 @@ Call Sequence::call(std::size_t index) const {
   const int frame = range_.frames()[index];
   Call call{fmt::format("frame {}", frame),
             {.frame = frame, .framesSinceFirst = frame - range_.first()},
+            {{"frame", frame}},
             arguments_};
   for (const Word& word : words_) call.arguments[word.index] = word.pattern.path(frame);
   return call;

@@ -18,8 +18,10 @@ std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, 
 struct Call {
   /// "frame 12"
   std::string name;
-  Run::Part part;
-  std::vector<std::string> arguments;
+  Run::Part part{};
+  /// What sets it apart, for --stats: {"frame": 12}
+  nlohmann::json values{};
+  std::vector<std::string> arguments{};
 };
 
 /// A command line that stands for one call for each of its --frames: every argument with a place for the

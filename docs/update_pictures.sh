@@ -76,6 +76,12 @@ if picture looks; then
   padding="" tiles looks.jpg 3x3 $files
 fi
 
+if picture wedge; then
+  "$program" cloud $base -o wedge.vdb --resolution 240 $usual --wedge billow=0,1 --wedge amplitude=1%,2.5%,5% --contact-sheet wedge.png --quiet
+  oiiotool wedge.png --resize 1280x0 --quality 88 -o wedge.jpg
+  keep wedge.jpg
+fi
+
 if picture bunny; then
   grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
   show bunny bunny.vdb --size 960x720

@@ -25,8 +25,20 @@ void addSeveralCalls(CLI::App& app, CommonOptions& options) {
       ->type_name("I/N")
       ->group(kSeveralGroup);
   if (!app.get_option_no_throw("--output")) return;
+  app.add_option(
+         "--wedge", options.wedges,
+         "Make one call for every value of an option, seed=1-12 or billow=0,0.5,1,2, each with outputs "
+         "of its own name; given twice, for every pair. Semicolons separate what has commas.")
+      ->type_name("OPTION=VALUES")
+      ->allow_extra_args(false)
+      ->group(kSeveralGroup);
   app.add_flag("--skip-existing", options.skipExisting,
-               "Keep the frames that are there, whole and made with the same options.")
+               "Keep the outputs of calls that are there, whole and made with the same options.")
+      ->group(kSeveralGroup);
+  markOutput(app.add_option(
+                 "--contact-sheet", options.contactSheet,
+                 "All frames, or all values of --wedge, small on one picture (.png), each with its name."))
+      ->type_name("FILE")
       ->group(kSeveralGroup);
 }
 

@@ -229,7 +229,7 @@ bool ProgramRun::cancelled() const {
 }
 
 void ProgramRun::result(const std::string& line) const {
-  if (options_.quiet) return;
+  if (options_.quiet || !tellsResults) return;
   const std::lock_guard lock(mutex_);
   clearBar();
   const std::string text = printable(line) + '\n';

@@ -47,6 +47,9 @@ class ProgramRun : public Run {
   /// Ends it. Its stages and statistics, with its seconds, which are taken out of this run's.
   nlohmann::json endPart();
 
+  /// Whether lines of result are shown.
+  bool tellsResults = true;
+
   /// Ends the last stage and clears the bar. Call before anything else is printed.
   void finish() const;
 

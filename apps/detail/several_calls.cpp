@@ -52,6 +52,11 @@ std::vector<std::string> outputsOf(const CLI::App& app) {
   return files;
 }
 
+std::string valueOf(const CLI::App& app, const std::string& name) {
+  const CLI::Option* option = app.get_option_no_throw(name);
+  return option && option->count() > 0 ? option->results().front() : "";
+}
+
 bool isThere(const Command& command, const std::string& digest, const Run& run) {
   for (const std::string& path : outputsOf(command.app)) {
     if (!std::filesystem::exists(path)) return false;
@@ -65,9 +70,10 @@ bool isThere(const Command& command, const std::string& digest, const Run& run) 
 
 }  // namespace
 
-void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
+std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
   const std::optional<Extent> range = measured(verb, calls, run);
   auto list = nlohmann::json::array();
+  std::vector<MadeCall> made;
   std::size_t skipped = 0;
   const std::size_t count = calls.made.size();
   for (std::size_t i = 0; i != count; ++i) {
@@ -87,9 +93,11 @@ void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
       skipped += skips;
       if (!skips) command.bound.body(run);
       nlohmann::json entry = {{"name", call.name}, {"skipped", skips}};
-      if (call.part.frame) entry["frame"] = *call.part.frame;
+      if (call.values.is_object()) entry.update(call.values);
       entry.update(run.endPart());
       list.push_back(std::move(entry));
+      made.push_back({call.name, valueOf(command.app, "--output"), valueOf(command.app, "--preview"),
+                      command.options.look});
     } catch (const std::exception&) {
       run.endPart();
       run.note(
@@ -106,6 +114,7 @@ void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
                            {{range->box.min.x, range->box.min.y, range->box.min.z},
                             {range->box.max.x, range->box.max.y, range->box.max.z}}},
                           {"longest_side", range->longestSide}};
+  return made;
 }
 
 }  // namespace nephele::apps

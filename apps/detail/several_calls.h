@@ -21,9 +21,14 @@ struct SeveralCalls {
   bool skipExisting = false;
 };
 
+/// A call that was made: what it wrote, "" where it did not, and the look that was asked for.
+struct MadeCall {
+  std::string name, output, preview, look;
+};
+
 /// Makes one call after another, each on all threads. What is whole stays where a later one fails or is
 /// stopped, and it is said how many there are. The statistics of `run` get the list of calls.
 /// @throws as the verb does.
-void makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run);
+std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run);
 
 }  // namespace nephele::apps

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/image/text.h"
 
 namespace nephele {
 namespace {
@@ -71,13 +72,27 @@ ContactSheet::ContactSheet(int frameCount, int frameWidth, int frameHeight,
   for (int i = 0; i != count; ++i) shown_.push_back(int((long long)(i)*frameCount / count));
 
   const double aspect = double(frameWidth) / frameHeight;
-  columns_ = bestColumns(count, aspect);
+  require(options.labels.empty() || options.labels.size() == std::size_t(frameCount),
+          fmt::format("contact sheet: expected {} labels, got {}", frameCount, options.labels.size()));
+  require(!options.columns || *options.columns >= 1, "contact sheet: expected a column at least");
+  columns_ = options.columns.value_or(bestColumns(count, aspect));
   cellWidth_ = std::clamp((options.width - gap_ * (columns_ + 1)) / columns_, 1, frameWidth);
   cellHeight_ = std::max(1, int(std::lround(cellWidth_ / aspect)));
   image_.width = columns_ * cellWidth_ + gap_ * (columns_ + 1);
-  image_.height = rows() * cellHeight_ + gap_ * (rows() + 1);
+  // A band below each frame, of which letters take half.
+  if (!options.labels.empty()) labelHeight_ = std::clamp(cellWidth_ / 16, 14, 40);
+  image_.height = rows() * (cellHeight_ + labelHeight_) + gap_ * (rows() + 1);
   for (const char* name : kNames) image_.add(name);
   std::ranges::fill(image_.channels[3].values, 1.0f);
+  for (std::size_t i = 0; i != shown_.size() && labelHeight_ > 0; ++i)
+    drawLabel(int(i), options.labels[std::size_t(shown_[i])]);
+}
+
+void ContactSheet::drawLabel(int place, const std::string& label) {
+  const double width = textWidth(label), height = std::min(0.45 * labelHeight_, 0.95 * cellWidth_ / width);
+  const double x = left(place) + (cellWidth_ - width * height) / 2,
+               baseline = top(place) + cellHeight_ + (labelHeight_ + height) / 2;
+  if (width > 0) drawText(image_, label, {x, baseline, height}, {0.6f, 0.6f, 0.6f});
 }
 
 void ContactSheet::set(int place, const Image& frame) {
@@ -90,8 +105,6 @@ void ContactSheet::set(int place, const Image& frame) {
   std::array<std::vector<float>, 4> inFront;
   const bool hasBackdrop = frame.find("backdrop.R") && frame.find("backdrop.G") && frame.find("backdrop.B");
   if (hasBackdrop) inFront = inFrontOfBackdrop(frame);
-  const int left = gap_ + place % columns_ * (cellWidth_ + gap_),
-            top = gap_ + place / columns_ * (cellHeight_ + gap_);
   for (std::size_t c = 0; c != std::size(kNames); ++c) {
     const std::vector<float>& from = hasBackdrop ? inFront[c] : frame.channel(kNames[c]).values;
     for (int y = 0; y != cellHeight_; ++y) {
@@ -102,7 +115,7 @@ void ContactSheet::set(int place, const Image& frame) {
         for (int v = rows.begin; v != rows.end; ++v)
           for (int u = columns.begin; u != columns.end; ++u)
             sum += rows.share(v) * columns.share(u) * double(from[std::size_t(v) * frameWidth_ + u]);
-        image_.channels[c].values[std::size_t(top + y) * image_.width + left + x] = float(sum);
+        image_.channels[c].values[std::size_t(top(place) + y) * image_.width + left(place) + x] = float(sum);
       }
     }
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "nephele/render/image/image.h"
@@ -13,13 +15,18 @@ struct ContactSheetOptions {
   int gap = 4;
   /// Of more frames, this many evenly spread ones are shown.
   int mostFrames = 100;
+  /// Frames in a row; chosen if not given.
+  std::optional<int> columns{};
+  /// A line of text below each frame, in the order of the frames; none if empty.
+  std::vector<std::string> labels{};
 };
 
 /// Small copies of the frames of a sequence on one picture, in rows from the upper left.
 class ContactSheet {
  public:
   /// For `frameCount` frames of one size. Columns are chosen so that the sheet is about as wide as 16:9 and
-  /// few places stay empty. @throws Error if a number is below 1 (the gap: below 0).
+  /// few places stay empty, unless they are given. @throws Error if a number is below 1 (the gap: below 0),
+  /// or there are not as many labels as frames.
   ContactSheet(int frameCount, int frameWidth, int frameHeight, const ContactSheetOptions& options = {});
 
   /// Which frames are shown, in order, as numbers from 0 to frameCount - 1.
@@ -36,8 +43,12 @@ class ContactSheet {
   const Image& image() const { return image_; }
 
  private:
+  int left(int place) const { return gap_ + place % columns_ * (cellWidth_ + gap_); }
+  int top(int place) const { return gap_ + place / columns_ * (cellHeight_ + labelHeight_ + gap_); }
+  void drawLabel(int place, const std::string& label);
+
   int frameWidth_, frameHeight_, gap_;
-  int columns_ = 1, cellWidth_ = 1, cellHeight_ = 1;
+  int columns_ = 1, cellWidth_ = 1, cellHeight_ = 1, labelHeight_ = 0;
   std::vector<int> shown_;
   Image image_;
 };

@@ -83,5 +83,32 @@ TEST(ContactSheet, RefusesFramesThatDoNotFit) {
   EXPECT_THROW(ContactSheet(1, 0, 18), Error);
 }
 
+TEST(ContactSheet, WritesALabelBelowEachFrame) {
+  const ContactSheetOptions options{
+      .width = 400,
+      .gap = 4,
+      .columns = 1,
+      .labels = {"seed 1", "a name that is much too long for so small a frame"}};
+  ContactSheet sheet(2, 100, 60, options);
+  EXPECT_EQ(sheet.columns(), 1);
+  // The clamp of the band is 14 pixels.
+  EXPECT_EQ(sheet.image().height, 2 * (60 + 14) + 3 * 4);
+  const auto light = [&](int x0, int y0, int x1, int y1) {
+    double sum = 0;
+    for (int y = y0; y != y1; ++y)
+      for (int x = x0; x != x1; ++x) sum += double(sheet.image().at("G", x, y));
+    return sum;
+  };
+  EXPECT_EQ(light(0, 0, 108, 64), 0);
+  EXPECT_GT(light(4, 64, 104, 78), 5);
+  EXPECT_EQ(light(4, 78, 104, 142), 0);
+  EXPECT_GT(light(4, 142, 104, 156), 5);
+  // In the middle, and within the frame's width where there is much of it.
+  EXPECT_NEAR(light(4, 64, 54, 78) / light(4, 64, 104, 78), 0.5, 0.15);
+  EXPECT_EQ(light(0, 142, 4, 156) + light(104, 142, 108, 156), 0);
+  EXPECT_THROW(ContactSheet(3, 100, 60, options), Error);
+  EXPECT_THROW(ContactSheet(2, 100, 60, {.columns = 0}), Error);
+}
+
 }  // namespace
 }  // namespace nephele

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/detail/several_calls.h"
+
+namespace nephele::apps {
+
+/// Arguments that ask for a preview beside the output, where the verb can make one and none is asked for.
+std::vector<std::string> withPreview(std::vector<std::string> arguments, const CLI::App& app);
+
+/// Small pictures of what `calls` made, each with its name below, in `columns` where they are given. They are
+/// the previews; where the verb makes none, `render` looks at the outputs, with one camera and one
+/// extinction.
+/// @throws Error naming the file; CLI::ValidationError where outputs are nothing to look at.
+void writeCallSheet(const std::string& path, const std::vector<MadeCall>& calls, std::optional<int> columns,
+                    const Verb& render, ProgramRun& run);
+
+}  // namespace nephele::apps

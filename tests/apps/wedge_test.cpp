@@ -1,0 +1,164 @@
+// Wedges: one call for each value of an option, through the program.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/render/image/exr_io.h"
+#include "tests/support/density.h"
+#include "tests/support/run_program.h"
+
+namespace nephele::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Wedges : public testing::Test {
+ protected:
+  void SetUp() override {
+    writeVdbFile(folder.file("ball.vdb"), {toVdb(*ball(1, 0.1f), {"density", VdbGridInfo::Class::fogVolume})},
+                 {});
+  }
+  std::string file(const std::string& name) const { return folder.file(name); }
+  std::string cloud(const std::string& options) const {
+    return fmt::format("cloud {} -o '{}' --resolution 24 --layers 1 --stats '{}' {}",
+                       ownData("data/sphere_uv.obj"), file("c.vdb"), file("s.json"), options);
+  }
+  std::string rendering(const std::string& options) const {
+    return fmt::format("render '{}' -o '{}' --size 48x32 --samples 1 --stats '{}' {}", file("ball.vdb"),
+                       file("r.exr"), file("s.json"), options);
+  }
+  nlohmann::json wedge() const { return nlohmann::json::parse(textOf(file("s.json")))["wedge"]; }
+  static ProgramResult succeeds(const std::string& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.exitCode, 0) << arguments << '\n' << result.errors;
+    return result;
+  }
+  void refuses(const std::string& arguments, const std::string& message) const {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.exitCode, 2) << arguments;
+    EXPECT_NE(result.errors.find(message), std::string::npos) << arguments << '\n' << result.errors;
+    EXPECT_EQ(folder.entryCount(), 1u) << arguments;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(Wedges, MakeOneOutputForEachValue) {
+  succeeds(cloud("--wedge seed=1-3"));
+  ASSERT_EQ(wedge().size(), 3u);
+  const auto values = [&](const std::string& name) { return toBricks(readScalarGrid(file(name)))->values(); };
+  EXPECT_NE(values("c.seed_1.vdb"), values("c.seed_2.vdb"));
+  // A call of its own makes the same.
+  succeeds(cloud("--seed 2"));
+  EXPECT_EQ(values("c.vdb"), values("c.seed_2.vdb"));
+  EXPECT_EQ(describe(readScalarGrid(file("c.seed_3.vdb"))).metadata.at("seed"), "3");
+}
+
+TEST_F(Wedges, TakeRangesListsVectorsWordsAndFlags) {
+  const auto names = [&](const std::string& values) {
+    succeeds(rendering("--quality draft --wedge '" + values + "'"));
+    std::vector<std::string> result;
+    for (const auto& call : wedge()) result.push_back(call["name"]);
+    return result;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(names("albedo=1,1,1;0.5,0.6,0.7"), (Names{"albedo 1,1,1", "albedo 0.5,0.6,0.7"}));
+  EXPECT_EQ(names("fov=20-40x10"), (Names{"fov 20", "fov 30", "fov 40"}));
+  EXPECT_EQ(names("emission-scale=0-1x0.25,8"),
+            (Names{"emission-scale 0", "emission-scale 0.25", "emission-scale 0.5", "emission-scale 0.75",
+                   "emission-scale 1", "emission-scale 8"}));
+  EXPECT_EQ(names("view-transform=agx,filmic"), (Names{"view-transform agx", "view-transform filmic"}));
+  EXPECT_EQ(names("backdrop=false,true"), (Names{"backdrop false", "backdrop true"}));
+  EXPECT_FALSE(readImage(file("r.backdrop_false.exr")).find("backdrop.R"));
+  EXPECT_TRUE(readImage(file("r.backdrop_true.exr")).find("backdrop.R"));
+  EXPECT_EQ(names("exposure=-1,0,1-2"), (Names{"exposure -1", "exposure 0", "exposure 1", "exposure 2"}));
+  EXPECT_EQ(names("step=5%,10%"), (Names{"step 5%", "step 10%"}));
+  EXPECT_TRUE(fs::exists(file("r.step_5.exr")));
+  EXPECT_EQ(names("look=sunset,storm"), (Names{"look sunset", "look storm"}));
+}
+
+TEST_F(Wedges, OfTwoOptionsMakeATable) {
+  succeeds(rendering("--wedge fov=20,30 --wedge extinction=5,10,20 --contact-sheet '" + file("t.png") + "'"));
+  const auto calls = wedge();
+  ASSERT_EQ(calls.size(), 6u);
+  EXPECT_EQ(calls[4]["name"], "fov 30, extinction 10");
+  EXPECT_EQ(calls[4]["values"], (nlohmann::json{{"fov", "30"}, {"extinction", "10"}}));
+  EXPECT_EQ(calls[4]["extinction"], 10);
+  EXPECT_TRUE(fs::exists(file("r.fov_30.extinction_10.exr")));
+  // Three columns of 48 pixels, gaps of 4, and two rows of 32 with a band of 14.
+  const Image sheet = readImage(file("t.png"));
+  EXPECT_EQ(sheet.width, 3 * 48 + 4 * 4);
+  EXPECT_EQ(sheet.height, 2 * (32 + 14) + 3 * 4);
+}
+
+TEST_F(Wedges, AreSeenByOneCameraWithOneExtinction) {
+  succeeds(rendering("--wedge density-scale=1,4 --contact-sheet '" + file("t.png") + "'"));
+  const auto calls = wedge();
+  EXPECT_EQ(calls[0]["extinction"], calls[1]["extinction"]);
+  EXPECT_EQ(readImageCamera(file("r.density-scale_1.exr"))->worldToCamera,
+            readImageCamera(file("r.density-scale_4.exr"))->worldToCamera);
+  // Previews stand beside the pictures, since the sheet is made of them.
+  EXPECT_TRUE(fs::exists(file("r.density-scale_4.png")));
+}
+
+// The verb makes no pictures: the sheet's are those of `render`, and only the sheet stays.
+TEST_F(Wedges, OfVolumesHaveASheetToo) {
+  const ProgramResult result =
+      succeeds(cloud("--wedge amplitude=1%,10% --contact-sheet '" + file("t.png") + "'"));
+  EXPECT_NE(result.output.find("t.png: 2 pictures in 2 columns"), std::string::npos) << result.output;
+  EXPECT_EQ(result.output.find(".exr"), std::string::npos) << result.output;
+  const Image sheet = readImage(file("t.png"));
+  EXPECT_EQ(sheet.width, 2 * 640 + 3 * 4);
+  // The ball, two clouds, the sheet and the statistics.
+  EXPECT_EQ(folder.entryCount(), 5u);
+  EXPECT_EQ(wedge().size(), 2u);
+}
+
+TEST_F(Wedges, AreNumberedWhereThereIsAPlace) {
+  succeeds(fmt::format("render '{}' -o '{}' --size 16x12 --samples 1 --wedge fov=20,30", file("ball.vdb"),
+                       file("n.##.exr")));
+  EXPECT_TRUE(fs::exists(file("n.01.exr")) && fs::exists(file("n.02.exr")));
+}
+
+TEST_F(Wedges, KeepWhatIsWhole) {
+  succeeds(cloud("--wedge seed=1-3"));
+  fs::remove(file("c.seed_2.vdb"));
+  succeeds(cloud("--wedge seed=1-4 --skip-existing"));
+  std::string skipped;
+  const auto calls = wedge();
+  for (const auto& call : calls) skipped += call["skipped"] == true ? 's' : 'm';
+  EXPECT_EQ(skipped, "smsm");
+  // A value that cannot be made ends the work, and what was made stays.
+  const ProgramResult result =
+      runProgram(fmt::format("render '{}' -o '{}' --size 16x12 --samples 1 --wedge grid=density,smoke",
+                             file("ball.vdb"), file("g.exr")));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("smoke"), std::string::npos) << result.errors;
+}
+
+TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
+  refuses(cloud("--wedge seed=1-10000"), "10000 calls are more than 1000");
+  refuses(cloud("--wedge seed=1-100 --wedge billow=1-100"), "10000 calls are more than 1000");
+  refuses(cloud("--wedge seed=0-1e300"), "more than 1000");
+  refuses(cloud("--wedge seeds=1-3"), "did you mean 'seed'?");
+  refuses(cloud("--wedge output=a.vdb,b.vdb"), "not an option that a wedge can vary");
+  refuses(cloud("--wedge threads"), "OPTION=VALUES");
+  refuses(cloud("--wedge seed="), "OPTION=VALUES");
+  refuses(cloud("--wedge seed=1,,2"), "OPTION=VALUES");
+  refuses(cloud("--wedge seed=3-1"), "a range that grows");
+  refuses(cloud("--wedge seed=1,2,1"), "there twice");
+  refuses(cloud("--wedge seed=1,2 --wedge seed=3,4"), "there twice");
+  refuses(cloud("--wedge seed=1,2 --seed 4"), "given by itself");
+  refuses(cloud("--wedge seed=1,2 --wedge billow=0,1 --wedge roughness=0,1"), "two options make a table");
+  // Also a value that only the last call would have.
+  refuses(cloud("--wedge seed=1,2,x"), "--seed: got 'x'");
+  refuses(cloud("--wedge half=true,yes"), "it is a flag");
+  refuses(cloud("--wedge seed=1,2 --frames 1-3"), "leave out --frames");
+  refuses(cloud("--contact-sheet '" + file("t.png") + "'"), "give --frames or --wedge");
+}
+
+}  // namespace
+}  // namespace nephele::test
