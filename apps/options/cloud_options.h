@@ -23,8 +23,8 @@ struct CloudArguments {
   FieldValue amplitude = parseFieldValue("--amplitude", "2.5%", kAmplitude);
   FieldValue frequency = parseFieldValue("--frequency", "4.4x", kFrequency);
   FieldValue lacunarity = parseFieldValue("--lacunarity", "2.1", kLacunarity);
-  FieldValue roughness = parseFieldValue("--roughness", "0.55", kRoughness);
-  FieldValue billow = parseFieldValue("--billow", "1", kBillow);
+  FieldValue roughness = parseFieldValue("--roughness", "0.6", kRoughness);
+  FieldValue billow = parseFieldValue("--billow", "0.5", kBillow);
   FieldValue billowScale = parseFieldValue("--billow-scale", "1", kBillowScale);
   FieldValue edgeThickness = parseFieldValue("--edge-thickness", "0.35%", kEdgeThickness);
   /// What needs no conversion: count and noise of the layers; the rest is filled in by `resolved`.

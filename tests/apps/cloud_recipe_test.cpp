@@ -57,7 +57,7 @@ TEST_F(CloudRecipe, OfLayersWithoutKeysIsTheFractalForm) {
   EXPECT_EQ(fractal->values(), recipe->values());
   // What the fractal form gives a layer, said again by the recipe.
   const auto same = grown(
-      "[[layer]]\nfrequency = \"4.4x\"\nnoise = \"value\"\n[[layer]]\namplitude = \"1.65%\"\nbillow = 1\n",
+      "[[layer]]\nfrequency = \"4.4x\"\nnoise = \"value\"\n[[layer]]\namplitude = \"1.8%\"\nbillow = 0.5\n",
       common);
   for (int i = -30; i <= 30; ++i)
     for (int j = -30; j <= 30; ++j) EXPECT_NEAR(same->at({i, j, 2}), fractal->at({i, j, 2}), 1e-3);
@@ -170,7 +170,7 @@ TEST_F(CloudRecipe, ThoseOfTheDocumentationAreRead) {
 
 TEST_F(CloudRecipe, IsToldWithVerbose) {
   grown("[[layer]]\nnoise = \"gabor\"\namplitude = \"height:0=0.01,1=0.02\"\n", "--resolution 24 --verbose");
-  EXPECT_NE(notes.find("layer 1: gabor, frequency 2.2, amplitude 0.01 to 0.02, billow 1"), std::string::npos)
+  EXPECT_NE(notes.find("layer 1: gabor, frequency 2.2, amplitude 0.01 to 0.02, billow 0.5"), std::string::npos)
       << notes;
 }
 
