@@ -49,7 +49,8 @@ struct BakedLight {
   /// Of every part of the sky.
   std::vector<Vec3f> skyGains;
   std::vector<std::size_t> layers;
-  /// As scene.scattered and scene.glow, which ViewLight makes of them; shared by colours that are alike.
+  /// Of every colour of every light in turn, the suns first and the sky last, null where there is none; and
+  /// of what glows. Shared by colours that are alike. ViewLight makes scene.scattered of them.
   std::vector<std::shared_ptr<const ScatteredLight>> scattered, glow;
   std::vector<Vec3d> directions;
   ForwardLight forward;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "nephele/render/light/scattered_light.h"
@@ -17,12 +16,11 @@ class ViewLight {
   ViewLight(const BakedLight& lit, const Viewpoint& viewpoint);
 
   /// Lets a march read it. Must outlive that.
-  void bind(MarchScene& scene) const;
+  void bind(MarchScene& scene) const { scene.scattered = scattered_; }
 
  private:
-  // Shared where the light is.
-  using Values = std::shared_ptr<const std::vector<float>>;
-  std::vector<Values> scattered_, glow_;
+  std::vector<std::vector<float>> nodes_;
+  std::vector<MarchScene::Scattered> scattered_;
 };
 
 }  // namespace nephele::detail

@@ -53,6 +53,13 @@ struct MarchResult {
   /// Opacity per colour that MarchRay::holdout leaves to be seen, if there is a holdout.
   float heldOpacity[3] = {};
   std::uint32_t samples = 0;
+
+  /// What scattered light of a kind adds to.
+  float& of(const MarchScene::Scattered::Kind& kind) {
+    return (kind.light >= 0                              ? suns[kind.light]
+            : kind.light == MarchScene::Scattered::kGlow ? emission
+                                                         : sky)[kind.part];
+  }
 };
 
 /// What a ray met on its way: the steps that added opacity or light, and every few steps the result so far.

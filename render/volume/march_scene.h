@@ -47,8 +47,6 @@ struct MarchScene {
   /// emissionScale * emission per world unit.
   ColourBricks colour, emission;
   float emissionScale = 1.0f;
-  /// What is scattered of the emission, per colour, as `scattered`; null where there is none.
-  const float* glow[3] = {};
   /// Multiplies the extinction, at most 1 each.
   float extinctionColour[3] = {1.0f, 1.0f, 1.0f};
   bool hasExtinctionColour() const {
@@ -104,9 +102,21 @@ struct MarchScene {
   /// Whether the shadows of a light differ between colours.
   bool hasColouredShadow = false;
 
-  /// Scattered light on dense lattices of `scatteredSize` nodes: `colours` of every sun in turn, then of the
-  /// locals, and `skyParts` of the sky; null where there is none. Empty if there is none at all.
-  std::vector<const float*> scattered;
+  /// Scattered light of one or two kinds on a dense lattice of `scatteredSize` nodes, first axis fastest: two
+  /// numbers side by side for every node, so that both are read at once.
+  struct Scattered {
+    static constexpr int kSky = -1, kGlow = -2;
+    /// A light (the locals follow the suns), the sky or what glows, and which of its `colours`, or of the
+    /// sky's `skyParts`.
+    struct Kind {
+      int light = kSky, part = 0;
+    };
+    const float* nodes = nullptr;
+    int count = 2;
+    Kind kinds[2];
+  };
+  std::vector<Scattered> scattered;
+  static constexpr int kMostScattered = (3 * (kMostLights + 2) + 1) / 2;
   Vec3i scatteredSize{};
 
   /// Octave n of a sun sees extinction * attenuation[n].

@@ -14,11 +14,11 @@ namespace nephele::test {
 
 namespace {
 
-float sample(const float* block, const Vec3f& p, int strideY, int strideZ) {
+float sample(const float* block, const Vec3f& p, int strideX, int strideY, int strideZ) {
   const Vec3i cell{int(p.x), int(p.y), int(p.z)};
   const Vec3f f = p - Vec3f(cell);
-  const float* at = block + cell.z * strideZ + cell.y * strideY + cell.x;
-  const auto edge = [&](int offset) { return at[offset] + f.x * (at[offset + 1] - at[offset]); };
+  const float* at = block + cell.z * strideZ + cell.y * strideY + cell.x * strideX;
+  const auto edge = [&](int offset) { return at[offset] + f.x * (at[offset + strideX] - at[offset]); };
   const float near = edge(0) + f.y * (edge(strideY) - edge(0));
   const float far = edge(strideZ) + f.y * (edge(strideZ + strideY) - edge(strideZ));
   return near + f.z * (far - near);
@@ -35,7 +35,7 @@ float sample(const MarchScene::Bricks& bricks, const Vec3f& p, int width, int be
       bricks.table[(std::size_t(brick.z) * bricks.count.y + std::size_t(brick.y)) * bricks.count.x +
                    std::size_t(brick.x)]);
   const int plane = width * width;
-  return sample(bricks.values + pool * std::size_t(plane * width) + before * (plane + width + 1), local,
+  return sample(bricks.values + pool * std::size_t(plane * width) + before * (plane + width + 1), local, 1,
                 width, plane);
 }
 
@@ -144,23 +144,13 @@ bool stepScalar(const MarchScene& scene, const MarchRay& ray, float s, float ds,
   }
   for (std::size_t i = 0; i != scene.locals.size(); ++i)
     addLocal(scene, ray, i, s, ds, weight, result.suns[scene.suns.size() + i]);
-  if (!scene.scattered.empty()) {
+  for (const MarchScene::Scattered& lattice : scene.scattered) {
     const Vec3i size = scene.scatteredSize;
     Vec3f p = at(ray.scattered);
     for (int axis = 0; axis != 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, float(size[axis] - 1) - 1e-3f);
-    std::size_t lattice = 0;
-    for (std::size_t light = 0; light <= scene.lightCount(); ++light)
-      for (int c = 0; c != (light < scene.lightCount() ? scene.colours : scene.skyParts); ++c)
-        if (const float* values = scene.scattered[lattice++])
-          (light < scene.lightCount() ? result.suns[light] : result.sky)[c] +=
-              weight[c] * sample(values, p, size.x, size.x * size.y);
-  }
-  if (scene.glow[0]) {
-    const Vec3i size = scene.scatteredSize;
-    Vec3f p = at(ray.scattered);
-    for (int axis = 0; axis != 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, float(size[axis] - 1) - 1e-3f);
-    for (int c = 0; c != 3; ++c)
-      result.emission[c] += weight[c] * sample(scene.glow[c], p, size.x, size.x * size.y);
+    for (int n = 0; n != lattice.count; ++n)
+      result.of(lattice.kinds[n]) +=
+          weight[lattice.kinds[n].part] * sample(lattice.nodes + n, p, 2, 2 * size.x, 2 * size.x * size.y);
   }
   return after > scene.cutoff;
 }

@@ -38,6 +38,7 @@ class Marcher {
         isHeld_(!ray.holdout.empty()),
         needsBegin_(isHeld_ || record) {
     std::fill_n(through_, kColours, 1.0f);
+    for (std::size_t i = 0; i != sumCount(); ++i) sums_[i] = hn::Zero(Lanes());
   }
 
   // `count` steps of length `ds` from `start` on, of this density if it is not negative. False once the ray
@@ -87,6 +88,7 @@ class Marcher {
     lightAll();
     result_.opticalDepth = depth_;
     if (record_) mark();
+    addSums(result_);
   }
 
  private:
@@ -180,10 +182,14 @@ class Marcher {
   void mark() {
     const MarchResult before = result_;
     const LitSteps<kColours> waiting = lit_;
+    Floats sums[kMostSums];
+    std::copy_n(sums_, sumCount(), sums);
     lightAll();
+    addSums(result_);
     record_->marks.push_back({record_->steps.size(), result_});
     result_ = before;
     lit_ = waiting;
+    std::copy_n(sums, sumCount(), sums_);
   }
 
   // The steps of a block, before its light is added.
@@ -200,7 +206,7 @@ class Marcher {
   }
 
   // What steps weigh in the picture, by their own optical depths and those behind them: the transmittance
-  // that each takes away. Adds what glows in them.
+  // that each takes away, and nothing where the ray is as good as opaque. Adds what glows in them.
   HWY_INLINE void weigh(Floats own, Floats after, Floats seen, LitPart<kColours>& steps) {
     const Lanes d;
     Floats before[kColours];
@@ -211,6 +217,10 @@ class Marcher {
       steps.weight[c] = hn::Sub(before[c], left);
       through_[c] = hn::GetLane(broadcastLast(left));
     }
+    Floats most = before[0];
+    for (int c = 1; c != kColours; ++c) most = hn::Max(most, before[c]);
+    const auto isSeen = hn::Gt(most, hn::Set(d, scene_.cutoff));
+    for (Floats& weight : steps.weight) weight = hn::IfThenElseZero(isSeen, weight);
     if constexpr (kColours == 3) {
       if (scene_.emission.table) glow(own, before, seen, steps);
       if (scene_.colour.table) colour(own, steps);
@@ -273,36 +283,43 @@ class Marcher {
         for (int c = 0; c != colours; ++c)
           sums[c] = hn::MulAdd(lit[kColours == 1 ? 0 : c], hn::Set(d, ray_.weight[sun][c][n]), sums[c]);
       }
-      for (int c = 0; c != colours; ++c)
-        result_.suns[sun][c] +=
-            hn::GetLane(hn::SumOfLanes(d, hn::Mul(sums[c], steps.weight[kColours == 1 ? 0 : c])));
+      for (int c = 0; c != colours; ++c) {
+        Floats& sum = sums_[3 * sun + std::size_t(c)];
+        sum = hn::MulAdd(sums[c], steps.weight[kColours == 1 ? 0 : c], sum);
+      }
     }
     for (std::size_t n = 0; n != scene_.locals.size(); ++n)
       addLocal(scene_, ray_, n, jitter_, steps.s, steps.length, steps.weight, result_);
-    if (scene_.scattered.empty() && (kColours == 1 || !scene_.glow[0])) return;
-    scattered(steps);
+    if (!scene_.scattered.empty()) scattered(steps);
   }
 
   // The part of it that the lattices hold.
   void scattered(const LitPart<kColours>& steps) {
-    const Lanes d;
     Cells cells;
     locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells);
-    const auto add = [&](const float* values, int c, float& to) HWY_ATTR {
-      const Floats weight = steps.weight[kColours == 1 ? 0 : c];
-      to += hn::GetLane(hn::SumOfLanes(d, hn::Mul(read(values, cells), weight)));
-    };
-    std::size_t lattice = 0;
-    if (!scene_.scattered.empty())
-      for (std::size_t light = 0; light <= scene_.lightCount(); ++light) {
-        const bool isSky = light == scene_.lightCount();
-        float* result = isSky ? result_.sky : result_.suns[light];
-        const int parts = isSky ? scene_.skyParts : scene_.colours;
-        for (int c = 0; c != parts; ++c)
-          if (const float* values = scene_.scattered[lattice++]) add(values, c, result[c]);
-      }
-    if constexpr (kColours == 3)
-      for (int c = 0; c != 3 && scene_.glow[0]; ++c) add(scene_.glow[c], c, result_.emission[c]);
+    Floats* sum = sums_ + 3 * scene_.suns.size();
+    for (const MarchScene::Scattered& lattice : scene_.scattered) {
+      Floats two[2];
+      readTwo(lattice.nodes, cells, two);
+      for (int n = 0; n != 2; ++n, ++sum)
+        *sum = hn::MulAdd(two[n], steps.weight[kColours == 1 ? 0 : lattice.kinds[n].part], *sum);
+    }
+  }
+
+  // Of the light so far, a vector each: three colours of every sun, then the scattered lattices.
+  static constexpr std::size_t kMostSums = 3 * MarchScene::kMostSuns + 2 * MarchScene::kMostScattered;
+  std::size_t sumCount() const { return 3 * scene_.suns.size() + 2 * scene_.scattered.size(); }
+
+  void addSums(MarchResult& result) const {
+    const Lanes d;
+    const Floats* sum = sums_;
+    for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun, sum += 3)
+      for (int c = 0; c != scene_.colours; ++c) result.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, sum[c]));
+    for (const MarchScene::Scattered& lattice : scene_.scattered) {
+      for (int n = 0; n != lattice.count; ++n)
+        result.of(lattice.kinds[n]) += hn::GetLane(hn::SumOfLanes(d, sum[n]));
+      sum += 2;
+    }
   }
 
   const MarchScene& scene_;
@@ -328,6 +345,7 @@ class Marcher {
   // What is left of light from behind, per colour.
   float through_[kColours];
   LitSteps<kColours> lit_;
+  Floats sums_[kMostSums];
 };
 
 }  // namespace nephele::HWY_NAMESPACE

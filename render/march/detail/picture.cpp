@@ -54,6 +54,7 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
       motion_(scene.volumeMotion),
       blurred_(scene.isBlurred()),
       pattern_(pixelPattern(options.samples, options.seed)),
+      fromLattice_(lit.source->density().indexToWorld()),
       scene_(lit.scene),
       viewLight_(lit, viewpointOf(camera_)) {
   viewLight_.bind(scene_);
@@ -124,7 +125,7 @@ bool Picture::prepare(const Ray& ray, const DepthBounds::Range& reach, const Sub
   // what its neighbours hide. Terraces less than a pixel wide need no hiding.
   const Vec3f beside =
       sub.lattice * std::min(1.0f, lit_.voxelSize / (4 * float(camera_.pixelWidth(double(out.start)))));
-  const Vec3d besideEntry = entry + Vec3d(lit_.source->density().indexToWorld().linear * beside);
+  const Vec3d besideEntry = entry + fromLattice_.vector(Vec3d(beside));
   out.density.origin += beside;
   if (lit_.toScattered) {
     out.scattered = lit_.toScattered->ray(entry, ray.direction);

@@ -82,6 +82,8 @@ class Picture {
   const RigidMotion* motion_;
   bool blurred_;
   std::vector<SubSample> pattern_;
+  // From the density's lattice to the world.
+  LatticeMap fromLattice_;
   // None for rays that are spread over a lens or over time.
   std::optional<DepthBounds> bounds_;
   MarchScene scene_;

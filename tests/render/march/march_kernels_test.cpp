@@ -26,13 +26,16 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   const RenderVolume volume(grid);
   const test::SunColumns sun({volume, {0.3f, 0.8f, 0.4f}});
   const LightVolume& light = sun.light;
-  std::vector<float> sky(5 * 4 * 3);
+  std::vector<float> sky(2 * 5 * 4 * 3);
   for (std::size_t i = 0; i != sky.size(); ++i) sky[i] = 0.5f + 0.4f * std::sin(float(i));
   const Affine toSky{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
 
   MarchScene scene = test::sceneOf(volume, sun);
   // Three colours of the sun, of which green has none, and of the sky.
-  scene.scattered = {sky.data(), nullptr, sky.data() + 1, sky.data(), sky.data(), sky.data()};
+  constexpr int kSky = MarchScene::Scattered::kSky;
+  scene.scattered = {{sky.data(), 2, {{0, 0}, {0, 2}}},
+                     {sky.data() + 2, 2, {{kSky, 0}, {kSky, 1}}},
+                     {sky.data(), 1, {{kSky, 2}, {kSky, 2}}}};
   scene.scatteredSize = {5, 4, 2};
   scene.octaves = 5;
   for (int n = 0; n != 5; ++n) scene.attenuation[n] = 1.0f / float(1 + n);

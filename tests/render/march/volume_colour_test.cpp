@@ -264,10 +264,12 @@ TEST(VolumeColour, KernelsAgreeWithTheScalarLoop) {
   set(volume.colour().emission, scene.emission);
   scene.extinctionColour[1] = 0.5f;
   scene.colours = scene.skyParts = 3;
-  std::vector<float> glowing(5 * 4 * 3);
+  std::vector<float> glowing(2 * 5 * 4 * 3);
   for (std::size_t i = 0; i != glowing.size(); ++i) glowing[i] = 0.5f + 0.4f * std::sin(float(i));
   const Affine toGlow{Mat3f::scaling(0.9f), {2, 1.5f, 1}};
-  for (const float*& values : scene.glow) values = glowing.data();
+  constexpr int kGlow = MarchScene::Scattered::kGlow;
+  scene.scattered = {{glowing.data(), 2, {{kGlow, 0}, {kGlow, 1}}},
+                     {glowing.data(), 1, {{kGlow, 2}, {kGlow, 2}}}};
   scene.scatteredSize = {5, 4, 3};
   scene.step = 0.1f;
   scene.leastStep = 0.0125f;
