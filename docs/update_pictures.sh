@@ -66,6 +66,31 @@ if picture clear_sky; then
   padding="" tiles clear_sky.jpg 3x2 $files
 fi
 
+if picture scale; then
+  grow congestus.vdb cloud --species congestus
+  files=
+  for scale in 300m 1km 5km 20km; do
+    show "scale_$scale" congestus.vdb --scale "$scale" --aerial-perspective --size 480x270
+    files="$files scale_$scale.png"
+  done
+  padding="" tiles scale.jpg 2x2 $files
+fi
+
+# Ten looks in the morning, at noon and in the evening; what they say of the sun gives way.
+if picture looks_day; then
+  files=
+  for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion wisps; do
+    verb=cloud
+    [ $look != wisps ] || verb=wisps
+    grow "look_$look.vdb" $verb --look "$look" --resolution 224
+    for sun in "100,12 1" "140,62 0" "85,3 2.5"; do
+      show "look_${look}_${sun%% *}" "look_$look.vdb" --look "$look" --sun "${sun% *}" --exposure "${sun#* }" --size 384x216
+      files="$files look_${look}_${sun%% *}.png"
+    done
+  done
+  padding="" tiles looks_day.jpg 3x10 $files
+fi
+
 if picture looks; then
   files=
   for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion; do
