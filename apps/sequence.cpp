@@ -90,6 +90,16 @@ std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, 
   return numbers;
 }
 
+void requireFrames(const std::string& name, const std::vector<int>& frames,
+                   const std::function<std::string(int frame)>& path) {
+  std::vector<int> missing;
+  for (const int frame : frames)
+    if (!fs::exists(path(frame))) missing.push_back(frame);
+  if (!missing.empty())
+    throw Error(fmt::format("{}: {} of {} frames {} missing: {}", name, missing.size(), frames.size(),
+                            missing.size() == 1 ? "is" : "are", rangesOf(missing)));
+}
+
 std::optional<Sequence> Sequence::of(const std::vector<std::string>& arguments) {
   if (!givenTo("--frames", arguments)) return std::nullopt;
   return Sequence(arguments);
@@ -157,16 +167,6 @@ void Sequence::requireNumberedOutputs(const CLI::App& first) const {
   }
 }
 
-void Sequence::requireFiles(const File& file) const {
-  std::vector<int> missing;
-  for (const int frame : range_.frames())
-    if (!fs::exists(file.path(frame))) missing.push_back(frame);
-  if (missing.empty()) return;
-  const std::string name = file.word->pattern.text().substr(file.start);
-  throw Error(fmt::format("{}: {} of {} frames {} missing: {}", name, missing.size(), size(),
-                          missing.size() == 1 ? "is" : "are", rangesOf(missing)));
-}
-
 void Sequence::requireSameGrids(const File& file, const Run& run) const {
   const std::string firstPath = file.path(range_.frames().front());
   if (!isVolumeFile(firstPath)) return;
@@ -193,7 +193,9 @@ void Sequence::requireSameGrids(const File& file, const Run& run) const {
 void Sequence::check(const CLI::App& first, const Run& run) const {
   requireNumberedOutputs(first);
   const std::vector<File> files = inputs(first);
-  for (const File& file : files) requireFiles(file);
+  for (const File& file : files)
+    requireFrames(file.word->pattern.text().substr(file.start), range_.frames(),
+                  [&](int frame) { return file.path(frame); });
   for (const File& file : files) requireSameGrids(file, run);
   for (const CLI::Option* option : first.get_options())
     for (const std::string& value : option->results())

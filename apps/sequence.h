@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,10 @@ namespace nephele::apps {
 /// The frames of `range` that are in `only`, and of these the share I/N of `shard`, each where it is not "".
 /// @throws CLI::ValidationError naming --only or --shard.
 std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, const std::string& shard);
+
+/// Refuses inputs called `name` of which one is missing. @throws Error naming the frames that are.
+void requireFrames(const std::string& name, const std::vector<int>& frames,
+                   const std::function<std::string(int frame)>& path);
 
 /// One of the calls that a command line stands for.
 struct Call {
@@ -66,7 +71,6 @@ class Sequence {
   const Word* wordOf(const std::string& value) const;
   std::vector<File> inputs(const CLI::App& first) const;
   void requireNumberedOutputs(const CLI::App& first) const;
-  void requireFiles(const File& file) const;
   void requireSameGrids(const File& file, const Run& run) const;
 
   std::vector<std::string> arguments_;

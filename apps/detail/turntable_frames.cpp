@@ -66,9 +66,11 @@ class FrameMaker {
     return camera.withShutter(poses);
   }
 
-  RenderResult make(int frame, const Camera& camera, const Progress& progress) {
+  RenderResult make(int frame, const Camera& camera, const std::shared_ptr<const Holdout>& holdout,
+                    const Progress& progress) {
     if (picture_.pathTraced) {
       PictureOptions picture = picture_;
+      picture.render.holdout = holdout;
       picture.lights = turntable_.lights(picture_.lights, frame);
       if (picture_.shutter.isInstant()) picture.render.nextCamera = turntable_.camera(start_, frame + 1);
       return picture.picture(volume_, camera, progress);
@@ -81,6 +83,7 @@ class FrameMaker {
       lightSeconds_ += light_->lightSeconds();
     }
     RenderOptions options = picture_.marched(camera);
+    options.holdout = holdout;
     if (picture_.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
     return light_->render(camera, options, progress);
   }
@@ -102,11 +105,15 @@ class FrameWriter {
   explicit FrameWriter(const ViewTransform& screen) : screen_(screen) {}
 
   // Returns when the frame before is written. @throws Error if that failed.
-  void write(const TurntableFrame& frame, Image image, const Camera& camera,
+  void write(const TurntableFrame& frame, Image image, std::optional<DeepImage> deep, const Camera& camera,
              std::map<std::string, std::string> metadata) {
     finish();
-    auto task = [this, &frame, camera, image = std::move(image), metadata = std::move(metadata)] {
-      writeExr(frame.path, image, camera, metadata);
+    auto task = [this, &frame, camera, image = std::move(image), deep = std::move(deep),
+                 metadata = std::move(metadata)] {
+      if (deep)
+        writeExrPair({frame.path, frame.deep}, image, *deep, camera, metadata);
+      else
+        writeExr(frame.path, image, camera, metadata);
       if (!frame.preview.empty()) writePng(frame.preview, image, screen_, metadata);
     };
     if (tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) == 1)
@@ -144,7 +151,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
     if (!frame.skipped) missing.push_back(&frame);
   }
   double marchSeconds = 0;
-  std::uint64_t rays = 0, samples = 0;
+  std::uint64_t rays = 0, samples = 0, deepSamples = 0;
   std::size_t notFinite = 0;
   FrameWriter writer(picture.screen);
   std::optional<FrameMaker> maker;
@@ -156,7 +163,9 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       const auto began = std::chrono::steady_clock::now();
       const FrameProgress progress(run, i, missing.size());
       const Camera camera = maker->camera(frame.number);
-      RenderResult result = maker->make(frame.number, camera, progress);
+      const auto holdout =
+          frame.holdout.empty() ? nullptr : readHoldout(frame.holdout, camera, run.memoryLimitBytes);
+      RenderResult result = maker->make(frame.number, camera, holdout, progress);
       picture.addSky(result.image, camera, turntable.lights(picture.lights, frame.number));
       live.complete(result.image);
       // Also where a frame has no work that would ask.
@@ -164,7 +173,8 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       notFinite += noteNotFinite(frame.path, result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
       metadata[kPartDigest] = plan.digest;
-      writer.write(frame, std::move(result.image), camera, std::move(metadata));
+      deepSamples += result.deep ? result.deep->sampleCount() : 0;
+      writer.write(frame, std::move(result.image), std::move(result.deep), camera, std::move(metadata));
       if (i + 1 == missing.size()) writer.finish();
       frame.seconds = secondsSince(began);
       marchSeconds += result.marchSeconds;
@@ -182,6 +192,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   run.stats["values_not_finite"] = notFinite;
   run.stats["rays"] = rays;
   run.stats["samples"] = samples;
+  if (!options.scene.deep.empty()) run.stats["deep_samples"] = deepSamples;
   run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;
   run.stats["march_seconds"] = marchSeconds;
 }

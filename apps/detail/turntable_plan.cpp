@@ -27,6 +27,12 @@ auto parsed(const std::string& option, const Parse& parse) {
   }
 }
 
+// Nothing where there is no `text`.
+std::optional<FramePattern> patternOf(const std::string& option, const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  return parsed(option, [&] { return FramePattern::parse(text); });
+}
+
 // What the linear pixels of a frame do not depend on, or only by its number.
 constexpr std::string_view kOthers[]{"frames",         "fps",         "only",      "shard", "exposure",
                                      "view-transform", "ocio-config", "background"};
@@ -56,9 +62,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   last = range.last();
   digest = optionsDigest(*options.app, kOthers, fmt::format("{}-{}", first, last));
   const FramePattern output = parsed("--output", [&] { return FramePattern::parse(options.output); });
-  std::optional<FramePattern> preview;
-  if (!options.preview.empty())
-    preview = parsed("--preview", [&] { return FramePattern::parse(options.preview); });
+  const auto preview = patternOf("--preview", options.preview);
   for (const auto& [name, path] :
        {std::pair{"--movie", options.movie}, {"--contact-sheet", options.contactSheet}})
     for (const auto& [other, value] : {std::pair{"--shard", options.shard}, {"--only", options.only}})
@@ -69,11 +73,20 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
                                                other, other));
 
   const std::vector<int> numbers = chosenFrames(range, options.only, options.shard);
+  const auto deep = patternOf("--deep", options.scene.deep);
+  const std::string& holdout = options.scene.holdout;
+  // One for all will do where nothing but the light moves.
+  const auto holdouts = FramePattern::places(holdout) == 0 ? std::nullopt : patternOf("--holdout", holdout);
+  const auto holdoutOf = [&](int number) { return holdouts ? holdouts->path(number) : holdout; };
   for (const int number : numbers)
-    frames.push_back({number, output.path(number), preview ? preview->path(number) : ""});
+    frames.push_back({number, output.path(number), preview ? preview->path(number) : "",
+                      deep ? deep->path(number) : "", holdoutOf(number)});
+  if (!holdout.empty()) requireFrames(holdout, numbers, holdoutOf);
   for (const TurntableFrame& frame : frames)
     if (!options.contactSheet.empty() && options.contactSheet == frame.preview)
       refuseValue("--contact-sheet", options.contactSheet, "another file than that of a frame of --preview");
+    else if (!frame.deep.empty() && (frame.deep == frame.path || frame.deep == frame.holdout))
+      refuseValue("--deep", options.scene.deep, "another file than those of --output and --holdout");
 }
 
 void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan) {
@@ -81,6 +94,7 @@ void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan) 
   if (!plan.frames.empty()) {
     paths.push_back(plan.frames.front().path);
     paths.push_back(plan.frames.front().preview);
+    paths.push_back(plan.frames.front().deep);
   }
   for (const std::string& path : paths) {
     if (path.empty()) continue;
@@ -101,11 +115,13 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run) {
           TurntableFrame& frame = plan.frames[i];
           const auto isWhole = [&](const std::string& path, const std::string& digest) {
             if (path.empty() || !std::filesystem::exists(path)) return false;
-            const std::string what = defect(path, camera.window(), digest);
+            const std::string what =
+                path == frame.deep ? outputDefect(path, digest) : defect(path, camera.window(), digest);
             if (!what.empty()) run.note(fmt::format("{}: {}; it is made again", path, what));
             return what.empty();
           };
-          frame.skipped = isWhole(frame.path, plan.digest);
+          frame.skipped =
+              isWhole(frame.path, plan.digest) && (frame.deep.empty() || isWhole(frame.deep, plan.digest));
           frame.previewSkipped = frame.skipped && isWhole(frame.preview, "");
         }
       },

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/options/object_options.h"
-#include "apps/options/render_options.h"
+#include "apps/options/scene_options.h"
 #include "nephele/render/image/frame_range.h"
 #include "nephele/render/image/movie.h"
 #include "nephele/render/scene/turntable.h"
@@ -14,13 +13,13 @@ namespace nephele::apps {
 
 /// The options of the verb turntable, as typed.
 struct TurntableOptions {
-  std::string input, output, preview, movie, contactSheet;
+  SceneOptions scene;
+  std::string output, preview, movie, contactSheet;
   std::string frames, only, shard;
   Orbit orbit = Orbit::camera;
   double turns = 1;
   bool skipExisting = false;
   MovieWriter::Options movieOptions;
-  ObjectOptions objects;
   PictureOptions picture;
   /// What these were read from.
   const CLI::App* app = nullptr;
@@ -30,8 +29,8 @@ struct TurntableOptions {
 struct TurntableFrame {
   int number = 0;
   std::string path;
-  /// "" if no preview is wanted.
-  std::string preview;
+  /// "" if no preview, or no depth, is wanted, or nothing stands in front.
+  std::string preview, deep, holdout;
   /// The files are there and whole, and are left as they are.
   bool skipped = false, previewSkipped = false;
   double seconds = 0;

@@ -45,8 +45,10 @@ void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inp
 }
 
 void addSceneOptions(CLI::App& app, SceneOptions& options, OutputTrial trial) {
+  // Air is put before deep pictures when they are merged.
   addOutput(app, "--deep", options.deep, {".exr"},
-            "The picture with depth: samples that give the picture when they are flattened.", trial);
+            "The picture with depth: samples that give the picture when they are flattened.", trial)
+      ->excludes("--aerial-perspective");
   app.add_option(
          "--holdout", options.holdout,
          "Deep picture (.exr) of what stands in front, for the same camera: of what is behind it only "

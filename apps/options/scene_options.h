@@ -27,7 +27,7 @@ struct SceneOptions {
 
 /// Declares the inputs on `app`, described by `inputs`.
 void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs);
-/// Declares --deep, --holdout and the options of objects.
+/// Declares --deep, --holdout and the options of objects, after those of pictures.
 void addSceneOptions(CLI::App& app, SceneOptions& options, OutputTrial trial = OutputTrial::program);
 
 }  // namespace nephele::apps

@@ -27,8 +27,6 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
   addPictureOptions(app, options.picture);
   addShadowOutput(app, options.picture.light);
   addSceneOptions(app, options.scene);
-  // Air is put before deep pictures when they are merged.
-  app.get_option("--aerial-perspective")->excludes("--deep");
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {

@@ -9,7 +9,7 @@ namespace nephele::apps {
 namespace {
 
 void bindOptions(CLI::App& app, TurntableOptions& options) {
-  app.add_option("input", options.input, "Density to look at (.vdb, .nvdb).")->required()->type_name("FILE");
+  addSceneInputs(app, options.scene, "Densities to look at (.vdb, .nvdb); where they overlap they add up.");
   addOutput(app, "-o,--output", options.output, {".exr"},
             "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.",
             OutputTrial::verb)
@@ -38,7 +38,7 @@ void bindOptions(CLI::App& app, TurntableOptions& options) {
   app.add_option("--shard", options.shard, "Make the share of machine I of N (from 1): every N-th frame.")
       ->type_name("I/N");
   addPictureOptions(app, options.picture);
-  addObjectOptions(app, options.objects);
+  addSceneOptions(app, options.scene, OutputTrial::verb);
   options.app = &app;
 }
 
@@ -62,14 +62,10 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   PictureOptions picture = options.picture.withView();
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
-  const RenderVolume volume =
-      readVolumes({options.input}, options.picture.volumes,
-                  {options.picture.shutter, options.picture.readsCodes(), options.objects.any()}, run);
-  if (volume.isEmpty()) run.note(options.input + ": the volume is empty, and so are its pictures");
+  const RenderVolume volume = options.scene.volume(options.picture, run);
   picture = picture.resolved(volume, run);
   const bool isShown = !options.preview.empty() || !options.movie.empty() || !options.contactSheet.empty();
-  options.objects.lift(picture);
-  options.objects.addTo(picture, volume, isShown, run.memoryLimitBytes);
+  options.scene.addTo(picture, volume, isShown, run);
   const Camera start = firstCamera(options, picture);
   const int width = start.window().width(), height = start.window().height();
   // Moving lights are made while those of the frame before are still there.
