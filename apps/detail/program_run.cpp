@@ -55,19 +55,14 @@ int stopSignal() {
 }
 
 double parseMemoryLimit(const std::string& text) {
-  double value = 0;
-  char unit = 0, rest = 0;
-  const int fields = std::sscanf(text.c_str(), "%lf%c%c", &value, &unit, &rest);
-  double factor = 0;
-  if (fields == 2) {
-    if (unit == '%') factor = allowedMemory() / 100;
-    if (unit == 'M' || unit == 'm') factor = 1e6;
-    if (unit == 'G' || unit == 'g') factor = 1e9;
-  }
-  if (factor == 0 || !std::isfinite(value) || value <= 0)
+  std::optional<double> bytes = parseBytes(text);
+  if (text.ends_with('%'))
+    if (const auto percent = parseNumber(std::string_view(text).substr(0, text.size() - 1)))
+      bytes = *percent / 100 * allowedMemory();
+  if (!bytes || *bytes <= 0)
     throw CLI::ValidationError("--memory-limit",
                                fmt::format("got '{}', allowed: a size such as 8G, 512M or 80%", text));
-  return value * factor;
+  return *bytes;
 }
 
 std::map<std::string, std::string> Run::metadata() const {

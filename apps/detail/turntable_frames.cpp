@@ -2,18 +2,22 @@
 //
 // The light is made once where it does not move as the volume sees it, and the sky's part of it once in any
 // case. The movie and the sheet are made of the files in the end, so that they are the same whether frames
-// were made now or by an earlier call.
+// were made now or by an earlier call; or of the frames as they are made, rounded as files would, where there
+// are to be no files.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <future>
 
 #include "apps/detail/turntable_plan.h"
 #include "apps/options/live_picture.h"
+#include "apps/options/picture_files.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/contact_sheet.h"
+#include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
 
@@ -99,22 +103,61 @@ class FrameMaker {
   double lightSeconds_ = 0;
 };
 
+// The movie and the contact sheet of all frames, one after the other.
+class Reel {
+ public:
+  Reel(const TurntableOptions& options, int count, const ViewTransform& screen)
+      : options_(options), count_(count), screen_(screen) {}
+
+  bool isWanted() const { return !options_.movie.empty() || !options_.contactSheet.empty(); }
+
+  void add(const Image& image) {
+    if (!options_.movie.empty()) {
+      if (!movie_) movie_.emplace(options_.movie, image.width, image.height, options_.movieOptions);
+      movie_->add(image, screen_);
+    }
+    if (!options_.contactSheet.empty()) {
+      if (!sheet_) sheet_.emplace(count_, image.width, image.height);
+      if (place_ < sheet_->shown().size() && sheet_->shown()[place_] == frame_)
+        sheet_->set(int(place_++), image);
+    }
+    ++frame_;
+  }
+
+  void addAsFile(Image image) {
+    for (Image::Channel& channel : image.channels)
+      if (channel.half)
+        for (float& value : channel.values) value = std::isnan(value) ? 0.0f : roundedToHalf(value);
+    add(image);
+  }
+
+  void finish(const std::map<std::string, std::string>& metadata) {
+    if (movie_) movie_->finish();
+    if (sheet_) writePng(options_.contactSheet, sheet_->image(), screen_, metadata);
+  }
+
+ private:
+  const TurntableOptions& options_;
+  const int count_;
+  const ViewTransform& screen_;
+  std::optional<MovieWriter> movie_;
+  std::optional<ContactSheet> sheet_;
+  int frame_ = 0;
+  std::size_t place_ = 0;
+};
+
 // Writes a frame while the next one is made, where more than one thread may run.
 class FrameWriter {
  public:
-  explicit FrameWriter(const ViewTransform& screen) : screen_(screen) {}
+  FrameWriter(const ViewTransform& screen, Reel& reel) : screen_(screen), reel_(reel) {}
 
   // Returns when the frame before is written. @throws Error if that failed.
-  void write(const TurntableFrame& frame, Image image, std::optional<DeepImage> deep, const Camera& camera,
+  void write(const TurntableFrame& frame, RenderResult picture, const Camera& camera,
              std::map<std::string, std::string> metadata) {
     finish();
-    auto task = [this, &frame, camera, image = std::move(image), deep = std::move(deep),
-                 metadata = std::move(metadata)] {
-      if (deep)
-        writeExrPair({frame.path, frame.deep}, image, *deep, camera, metadata);
-      else
-        writeExr(frame.path, image, camera, metadata);
-      if (!frame.preview.empty()) writePng(frame.preview, image, screen_, metadata);
+    auto task = [this, &frame, camera, picture = std::move(picture), metadata = std::move(metadata)] {
+      PictureFiles{frame.path, frame.preview, frame.deep}.write(picture, camera, screen_, metadata);
+      if (frame.path.empty() && reel_.isWanted()) reel_.addAsFile(picture.image);
     };
     if (tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) == 1)
       task();
@@ -127,6 +170,7 @@ class FrameWriter {
 
  private:
   const ViewTransform& screen_;
+  Reel& reel_;
   std::future<void> written_;
 };
 
@@ -136,12 +180,26 @@ std::map<std::string, std::string> metadataOf(const PictureOptions& picture, con
   return metadata;
 }
 
+void makeReel(const TurntablePlan& plan, const TurntableOptions& options, Reel& reel, Run& run) {
+  if (!reel.isWanted()) return;
+  if (!options.output.empty()) {
+    run.expect(0.95, 1.0);
+    run.begin("movie");
+    for (std::size_t i = 0; i != plan.frames.size(); ++i) {
+      run.check();
+      reel.add(readImage(plan.frames[i].path));
+      run.advance(double(i + 1) / double(plan.frames.size()));
+    }
+  }
+  reel.finish(run.metadata());
+}
+
 }  // namespace
 
 void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& given,
                 const RenderVolume& volume, const Camera& start, Run& run) {
   PictureOptions picture = given;
-  LivePicture live(picture.displayServer, options.output, picture.render);
+  LivePicture live(picture.displayServer, options.name(), picture.render);
   const Vec3f middle = volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
   const Turntable turntable(options.orbit, middle, plan.first, plan.last, options.turns);
   std::vector<TurntableFrame*> missing;
@@ -153,10 +211,11 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   double marchSeconds = 0;
   std::uint64_t rays = 0, samples = 0, deepSamples = 0;
   std::size_t notFinite = 0;
-  FrameWriter writer(picture.screen);
+  Reel reel(options, int(plan.frames.size()), picture.screen);
+  FrameWriter writer(picture.screen, reel);
   std::optional<FrameMaker> maker;
   if (!missing.empty()) maker.emplace(picture, volume, turntable, start, run);
-  run.expect(0.05, options.movie.empty() && options.contactSheet.empty() ? 1.0 : 0.95);
+  run.expect(0.05, reel.isWanted() && !options.output.empty() ? 0.95 : 1.0);
   run.begin("frames");
   for (std::size_t i = 0; i != missing.size(); ++i) try {
       TurntableFrame& frame = *missing[i];
@@ -170,21 +229,24 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       live.complete(result.image);
       // Also where a frame has no work that would ask.
       run.check();
-      notFinite += noteNotFinite(frame.path, result.image, run);
+      notFinite += noteNotFinite(
+          frame.path.empty() ? fmt::format("{}: frame {}", options.name(), frame.number) : frame.path,
+          result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
       metadata[kPartDigest] = plan.digest;
       deepSamples += result.deep ? result.deep->sampleCount() : 0;
-      writer.write(frame, std::move(result.image), std::move(result.deep), camera, std::move(metadata));
-      if (i + 1 == missing.size()) writer.finish();
-      frame.seconds = secondsSince(began);
       marchSeconds += result.marchSeconds;
       rays += result.rays;
       samples += result.samples;
+      writer.write(frame, std::move(result), camera, std::move(metadata));
+      if (i + 1 == missing.size()) writer.finish();
+      frame.seconds = secondsSince(began);
       run.advance(double(i + 1) / double(missing.size()));
     } catch (const Cancelled&) {
       writer.finish();
-      run.note(fmt::format("stopped after {} of {} frames; the same call with --skip-existing makes the rest",
-                           i, missing.size()));
+      run.note(
+          fmt::format("stopped after {} of {} frames{}", i, missing.size(),
+                      options.output.empty() ? "" : "; the same call with --skip-existing makes the rest"));
       throw;
     }
   live.finish(run);
@@ -195,33 +257,10 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   if (!options.scene.deep.empty()) run.stats["deep_samples"] = deepSamples;
   run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;
   run.stats["march_seconds"] = marchSeconds;
-}
-
-void makeMovieAndSheet(const TurntablePlan& plan, const TurntableOptions& options,
-                       const PictureOptions& picture, Run& run) {
-  if (options.movie.empty() && options.contactSheet.empty()) return;
-  run.expect(0.95, 1.0);
-  run.begin("movie");
-  std::optional<MovieWriter> movie;
-  std::optional<ContactSheet> sheet;
-  int place = 0;
-  const int count = int(plan.frames.size());
-  for (int i = 0; i != count; ++i) {
-    run.check();
-    const Image image = readImage(plan.frames[std::size_t(i)].path);
-    if (!options.movie.empty()) {
-      if (!movie) movie.emplace(options.movie, image.width, image.height, options.movieOptions);
-      movie->add(image, picture.screen);
-    }
-    if (!options.contactSheet.empty()) {
-      if (!sheet) sheet.emplace(count, image.width, image.height);
-      if (place < int(sheet->shown().size()) && sheet->shown()[std::size_t(place)] == i)
-        sheet->set(place++, image);
-    }
-    run.advance((i + 1.0) / count);
-  }
-  if (movie) movie->finish();
-  if (sheet) writePng(options.contactSheet, sheet->image(), picture.screen, run.metadata());
+  for (const TurntableFrame& frame : plan.frames)
+    run.stats["frames"].push_back(
+        {{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}});
+  makeReel(plan, options, reel, run);
 }
 
 }  // namespace nephele::apps

@@ -56,13 +56,19 @@ std::string defect(const std::string& path, const PixelBox& window, const std::s
 
 }  // namespace
 
+const std::string& TurntableOptions::name() const {
+  for (const std::string* file : {&output, &movie, &contactSheet, &preview})
+    if (!file->empty()) return *file;
+  return scene.deep;
+}
+
 TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
   digest = optionsDigest(*options.app, kOthers, fmt::format("{}-{}", first, last));
-  const FramePattern output = parsed("--output", [&] { return FramePattern::parse(options.output); });
-  const auto preview = patternOf("--preview", options.preview);
+  const auto output = patternOf("--output", options.output),
+             preview = patternOf("--preview", options.preview);
   for (const auto& [name, path] :
        {std::pair{"--movie", options.movie}, {"--contact-sheet", options.contactSheet}})
     for (const auto& [other, value] : {std::pair{"--shard", options.shard}, {"--only", options.only}})
@@ -79,7 +85,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const auto holdouts = FramePattern::places(holdout) == 0 ? std::nullopt : patternOf("--holdout", holdout);
   const auto holdoutOf = [&](int number) { return holdouts ? holdouts->path(number) : holdout; };
   for (const int number : numbers)
-    frames.push_back({number, output.path(number), preview ? preview->path(number) : "",
+    frames.push_back({number, output ? output->path(number) : "", preview ? preview->path(number) : "",
                       deep ? deep->path(number) : "", holdoutOf(number)});
   if (!holdout.empty()) requireFrames(holdout, numbers, holdoutOf);
   for (const TurntableFrame& frame : frames)

@@ -23,14 +23,16 @@ struct TurntableOptions {
   PictureOptions picture;
   /// What these were read from.
   const CLI::App* app = nullptr;
+
+  /// What messages call the pictures: the first of the outputs.
+  const std::string& name() const;
 };
 
 /// One frame of a turntable.
 struct TurntableFrame {
   int number = 0;
-  std::string path;
-  /// "" if no preview, or no depth, is wanted, or nothing stands in front.
-  std::string preview, deep, holdout;
+  /// "" where no such picture is wanted, or nothing stands in front.
+  std::string path, preview, deep, holdout;
   /// The files are there and whole, and are left as they are.
   bool skipped = false, previewSkipped = false;
   double seconds = 0;
@@ -59,12 +61,9 @@ void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan);
 void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run);
 
 /// Makes the frames that are not skipped, one after another, each on all threads: frames side by side would
-/// need the memory of as many pictures, and be no faster. Fills in their seconds and the run's statistics.
+/// need the memory of as many pictures, and be no faster. Then makes the movie and the contact sheet, where
+/// they are wanted, of all frames. Fills in the frames' seconds and the run's statistics.
 void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
                 const RenderVolume& volume, const Camera& start, Run& run);
-
-/// Reads all frames again, and makes the movie and the contact sheet of them, where they are wanted.
-void makeMovieAndSheet(const TurntablePlan& plan, const TurntableOptions& options,
-                       const PictureOptions& picture, Run& run);
 
 }  // namespace nephele::apps

@@ -89,17 +89,16 @@ void addLens(CLI::App& app, CameraOptions& options) {
       app, "--projection", options.frame.projection,
       {{"perspective", Camera::Projection::perspective}, {"orthographic", Camera::Projection::orthographic}},
       "How space becomes a picture.");
-  addOptional(app, "--orthographic-width", options.orthographicWidth, 1e-9, 1e12,
-              "Width of an orthographic picture in world units; default: what shows the volume.");
+  addLength(app, "--orthographic-width", options.orthographicWidth,
+            "Width of an orthographic picture; default: what shows the volume.", Sign::positive);
   CLI::Option* fStop =
       addOptional(app, "--f-stop", options.fStop, 0.01, 1e6,
                   "Depth of field of a lens whose diameter is its focal length / this, where "
                   "world units are metres.");
-  addOptional(app, "--lens-radius", options.lensRadius, 0, 1e12,
-              "Depth of field of a lens with this radius in world units.")
+  addLength(app, "--lens-radius", options.lensRadius, "Depth of field of a lens with this radius.")
       ->excludes(fStop);
-  addOptional(app, "--focus-distance", options.focusDistance, 1e-9, 1e12,
-              "What is sharp, in world units along the line of sight; default: the middle of the volume.");
+  addLength(app, "--focus-distance", options.focusDistance,
+            "What is sharp, along the line of sight; default: the middle of the volume.", Sign::positive);
 }
 
 void addTime(CLI::App& app, CameraOptions& options) {
@@ -177,13 +176,18 @@ class Placement {
     else if (key.verticalFovDegrees)
       frame.fovDegrees =
           float(fovDegreesOf(focalLengthOf(*key.verticalFovDegrees, frame.height), frame.width));
-    const std::optional<double> width =
-        options_.orthographicWidth ? options_.orthographicWidth : key.orthographicWidth;
+    const std::optional<double> width = chosen(options_.orthographicWidth, key.orthographicWidth);
     if (width) frame.orthographicWidth = float(*width);
     return frame;
   }
 
  private:
+  std::optional<double> chosen(const std::optional<Length>& option, std::optional<double> ofFile) const {
+    // Of nothing, a percentage may be anything.
+    const double side = options_.seen.longestSide;
+    return option ? option->worldUnits(side > 0 ? side : 1) : ofFile;
+  }
+
   // A camera that does not frame anything needs a width; all of a moving one's poses have the same.
   template <class Make>
   Camera fitted(Camera::Frame frame, const Make& make) {
@@ -200,7 +204,7 @@ class Placement {
   Camera withLens(const Camera& camera, const Camera::Frame& frame, const CameraKey& key) const {
     const bool fromOptions = options_.fStop || options_.lensRadius;
     const std::optional<double> fStop = fromOptions ? options_.fStop : key.fStop;
-    double radius = (fromOptions ? options_.lensRadius : key.lensRadius).value_or(0);
+    double radius = chosen(options_.lensRadius, fromOptions ? std::nullopt : key.lensRadius).value_or(0);
     if (fStop) {
       if (camera.isOrthographic())
         throw CLI::ValidationError("--f-stop",
@@ -208,7 +212,7 @@ class Placement {
       radius = 1e-3 * focalLengthOf(double(frame.fovDegrees), options_.filmWidth) / (2 * *fStop);
     }
     if (radius == 0) return camera;
-    const std::optional<double> focus = options_.focusDistance ? options_.focusDistance : key.focusDistance;
+    const std::optional<double> focus = chosen(options_.focusDistance, key.focusDistance);
     const double distance = focus ? *focus : camera.project(Vec3d(middleOf(options_.seen))).z;
     if (!(distance > 0))
       throw CLI::ValidationError("--focus-distance",

@@ -32,10 +32,11 @@ struct CameraOptions {
   /// What is given here goes before what the file says. Focal length and film in millimetres.
   std::optional<double> fovDegrees, focalLength;
   double filmWidth = 36;
-  std::optional<double> orthographicWidth;
-  std::optional<double> fStop, lensRadius;
+  /// Percentages are of the longest side of the volume, or of what is framed if it is empty.
+  std::optional<Length> orthographicWidth, lensRadius;
+  std::optional<double> fStop;
   /// The middle of the volume if not given.
-  std::optional<double> focusDistance;
+  std::optional<Length> focusDistance;
   Shutter shutter;
   /// World units, and degrees about its middle, per frame.
   std::optional<RigidMotion> volumeMotion;

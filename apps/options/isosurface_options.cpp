@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/adaptive_mesh.h"
@@ -35,7 +34,13 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
   const VdbGridInfo info = describe(file);
   run.requireMemory(estimatedBytes(info), "make the volume with larger voxels (--voxel-size)");
   const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
-  const double level = isovalueOption->count() > 0 ? isovalue : isLevelSet ? 0.0 : 0.5;
+  if (isovalue.relative && !isLevelSet)
+    refuseValue(
+        "--isovalue", fmt::format("{:g}%", isovalue.value),
+        fmt::format("a number; grid '{}' is no level set, so that its values are no lengths", info.name));
+  const double side =
+      isovalue.relative ? double(boundingBox(marchingCubes(*toBricks(file))).longestSide()) : 0.0;
+  const double level = isovalueOption->count() > 0 ? isovalue.worldUnits(side) : isLevelSet ? 0.0 : 0.5;
   run.stats["mesh"] = {{"isovalue", level}};
 
   const Mesh mesh = namingFile(volume, [&] {
@@ -54,13 +59,13 @@ void IsosurfaceOptions::refuseFor(const std::string& mesh) const {
 }
 
 void addIsosurfaceOptions(CLI::App& app, IsosurfaceOptions& options) {
-  constexpr double kAny = std::numeric_limits<double>::max();
   options.gridOption =
       app.add_option("--grid", options.grid, "Grid of the file; default: the first that holds numbers.")
           ->type_name("NAME");
   options.isovalueOption =
-      addNumber(app, "--isovalue", options.isovalue, -kAny, kAny,
-                "Level sets: world units that the surface moves inwards. Densities: inside is above.")
+      addLength(app, "--isovalue", options.isovalue,
+                "Level sets: how far the surface moves inwards. Densities: a number; inside is above.",
+                Sign::any)
           ->default_str("0 or, for densities, 0.5");
   options.adaptivityOption = addNumber(app, "--adaptivity", options.adaptivity, 0, 1,
                                        "Use OpenVDB's dual mesher; larger faces with larger values.")

@@ -10,7 +10,8 @@ namespace nephele::apps {
 /// Which surface of which grid to mesh, as typed.
 struct IsosurfaceOptions {
   std::string grid;
-  double isovalue = 0;
+  /// Percentages are of the longest side of a level set's surface.
+  Length isovalue;
   double adaptivity = 0;
   const CLI::Option* gridOption = nullptr;
   const CLI::Option* isovalueOption = nullptr;

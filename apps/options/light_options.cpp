@@ -143,30 +143,31 @@ void addLocals(CLI::App& app, LightOptions& options) {
 }
 
 void addSaid(CLI::App& app, LightOptions& options) {
-  addRepeated(
-      app, "--light-decay", "[NAME=]quadratic|linear|none[,START]",
-      "[NAME=]quadratic, linear or none, and a distance of at least 0 where it starts",
-      "How points and spots get weaker with distance, and up to where they do not; of one light or of "
-      "all.",
-      [&options](const std::string& name, const std::string& text) {
-        const std::size_t comma = text.find(',');
-        const std::string kind = text.substr(0, comma);
-        LightOptions::DecayFrom said;
-        if (kind == "linear")
-          said.decay = Decay::linear;
-        else if (kind == "none")
-          said.decay = Decay::none;
-        else if (kind != "quadratic")
-          return false;
-        if (comma != std::string::npos) {
-          const Numbers numbers =
-              parseNumbers("--light-decay", text.substr(comma + 1), "a distance of at least 0");
-          if (numbers.size() != 1 || numbers[0] < 0) return false;
-          said.start = float(numbers[0]);
-        }
-        options.decays.emplace_back(name, said);
-        return true;
-      })
+  addRepeated(app, "--light-decay", "[NAME=]quadratic|linear|none[,START]",
+              "[NAME=]quadratic, linear or none, and a length of at least 0 where it starts, in world units "
+              "or percent "
+              "of the longest side",
+              "How points and spots get weaker with distance, and up to where they do not (a length); of one "
+              "light or of "
+              "all.",
+              [&options](const std::string& name, const std::string& text) {
+                const std::size_t comma = text.find(',');
+                const std::string kind = text.substr(0, comma);
+                LightOptions::DecayFrom said;
+                if (kind == "linear")
+                  said.decay = Decay::linear;
+                else if (kind == "none")
+                  said.decay = Decay::none;
+                else if (kind != "quadratic")
+                  return false;
+                if (comma != std::string::npos) {
+                  const auto start = parseLength(std::string_view(text).substr(comma + 1));
+                  if (!start || start->value < 0) return false;
+                  said.start = *start;
+                }
+                options.decays.emplace_back(name, said);
+                return true;
+              })
       ->default_str("quadratic");
   const std::string form = "[NAME=]R,G,B, each within [0, 100]";
   addRepeated(
@@ -349,7 +350,7 @@ void LightOptions::setClearSky(const std::vector<std::size_t>& ofTheSky, Lights&
   result.sky = {};
 }
 
-Lights LightOptions::resolved(double mostBytes) const {
+Lights LightOptions::resolved(double longestSide, double mostBytes) const {
   Lights result = lights;
   std::vector<std::size_t> ofTheSky = sunsOfTheSky;
   if (noSun) {
@@ -365,7 +366,7 @@ Lights LightOptions::resolved(double mostBytes) const {
     for (LocalLight& light : result.locals)
       if (name.empty() || light.name == name) {
         light.decay = said.decay;
-        light.decayStart = said.start;
+        light.decayStart = float(said.start.worldUnits(longestSide));
         known = true;
       }
     requireLight("--light-decay", name, known, result);

@@ -21,7 +21,7 @@ struct LightOptions {
   using Said = std::vector<std::pair<std::string, T>>;
   struct DecayFrom {
     Decay decay = Decay::quadratic;
-    float start = 0;
+    Length start;
   };
 
   Lights lights;
@@ -41,8 +41,9 @@ struct LightOptions {
   Environment::Options sky;
 
   /// The lights of the picture; one sun where no light is given but a sky without a map. Reads the sky's map.
-  /// @throws Error if a name is unknown or taken twice, or a file cannot be read.
-  Lights resolved(double mostBytes) const;
+  /// Percentages are of `longestSide`. @throws Error if a name is unknown or taken twice, or a file cannot be
+  /// read.
+  Lights resolved(double longestSide, double mostBytes) const;
   /// Whether a density that is coded is enough for them all.
   bool readsCodes() const;
   /// Writes the deep shadow maps that are asked for. @throws Error naming the light or the file.

@@ -9,6 +9,7 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
@@ -69,8 +70,11 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
       ->default_str("with --sky clear, unless there is a --background");
   CLI::Option* ground = app.add_flag("--ground", options.ground,
                                      "A plane below the volume, in its shadow, as wide as can be seen.");
-  addOptional(app, "--ground-height", options.groundHeight, -1e9, 1e9,
-              "Of the plane; default: the bottom of the volume.")
+  addLength(
+      app, "--ground-height", options.groundHeight,
+      "Of the plane: y in world units, or above the volume's lowest point in percent of its longest side; "
+      "default: the bottom of the volume.",
+      Sign::any)
       ->needs(ground);
   addNumbers(
       app, "--ground-color", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.groundColour = v; },
@@ -86,18 +90,19 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
   for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path), .isHoldout = true});
   if (ground) {
     const Box& box = seen.box;
-    all.push_back({.mesh = groundPlane(box.center(), float(groundHeight.value_or(double(box.min.y))),
-                                       200 * box.longestSide()),
+    const Length height = groundHeight.value_or(Length{0, true});
+    const double y =
+        height.worldUnits(seen.longestSide) + (height.relative ? double(box.min.y) : 0.0);
+    all.push_back({.mesh = groundPlane(box.center(), float(y), 200 * box.longestSide()),
                    .colour = groundColour,
                    .castsShadows = false});
   }
   return all.empty() ? nullptr : std::make_shared<const Surfaces>(std::move(all));
 }
 
-// A picture shows them in its own light, which suits grey.
 std::vector<SurfaceObject> ObjectOptions::shapes(const std::vector<std::string>& paths,
                                                  double mostBytes) const {
-  return painted(*this, paths, {0.62f, 0.6f, 0.57f}, mostBytes);
+  return painted(*this, paths, kShapeColour, mostBytes);
 }
 
 void ObjectOptions::lift(CameraOptions& camera) const {

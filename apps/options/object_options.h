@@ -23,8 +23,9 @@ struct ObjectOptions {
   bool ground = false;
   /// Where it is not given, previews show a clear sky.
   std::optional<bool> backdrop;
-  /// Height of the ground; the bottom of the volume if not given.
-  std::optional<double> groundHeight;
+  /// y of the ground, or above the lowest point in percent of the volume's longest side; the bottom of the
+  /// volume if not given.
+  std::optional<Length> groundHeight;
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
 
   /// Of meshes and level sets that are the picture's only subject. @throws Error naming the file.

@@ -21,27 +21,64 @@ std::optional<double> parseNumber(std::string_view text) {
   return value;
 }
 
+std::optional<double> parseBytes(std::string_view text) {
+  if (text.empty()) return std::nullopt;
+  const char unit = text.back();
+  const double factor = unit == 'M' || unit == 'm' ? 1e6 : unit == 'G' || unit == 'g' ? 1e9 : 0;
+  const auto value = parseNumber(text.substr(0, text.size() - 1));
+  return value && *value > 0 && factor > 0 ? std::optional(*value * factor) : std::nullopt;
+}
+
 void refuseValue(const std::string& name, const std::string& text, const std::string& allowed) {
   const std::size_t comma = name.rfind(',');
   throw CLI::ValidationError(comma == std::string::npos ? name : name.substr(comma + 1),
                              fmt::format("got '{}', allowed: {}", text, allowed));
 }
 
+std::optional<Length> parseLength(std::string_view text) {
+  const bool relative = text.ends_with('%');
+  if (relative) text.remove_suffix(1);
+  const auto value = parseNumber(text);
+  // Positions are in single precision.
+  if (!value || !std::isfinite(float(*value))) return std::nullopt;
+  return Length{*value, relative};
+}
+
+namespace {
+
+CLI::Option* addLength(CLI::App& app, const std::string& name, const std::function<void(const Length&)>& set,
+                       const std::string& description, Sign sign) {
+  const std::string allowed =
+      fmt::format("a length{} in world units (0.3) or percent of the longest side (5%)",
+                  sign == Sign::positive      ? " > 0"
+                  : sign == Sign::notNegative ? " >= 0"
+                                              : "");
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, set, sign, allowed](const std::string& text) {
+            const auto length = parseLength(text);
+            if (!length || (sign != Sign::any && length->value < 0) ||
+                (sign == Sign::positive && length->value == 0))
+              refuseValue(name, text, allowed);
+            set(*length);
+          },
+          description)
+      ->type_name("LENGTH");
+}
+
+}  // namespace
+
+CLI::Option* addLength(CLI::App& app, const std::string& name, std::optional<Length>& target,
+                       const std::string& description, Sign sign) {
+  return addLength(
+      app, name, [&target](const Length& length) { target = length; }, description, sign);
+}
+
 CLI::Option* addLength(CLI::App& app, const std::string& name, Length& target, const std::string& description,
                        Sign sign) {
-  const std::string allowed =
-      fmt::format("a length {} 0 in world units (0.3) or percent of the longest side (5%)",
-                  sign == Sign::positive ? ">" : ">=");
-  auto* option = app.add_option_function<std::string>(
-      name,
-      [&target, name, sign, allowed](const std::string& text) {
-        const bool relative = text.ends_with('%');
-        const auto value = parseNumber(std::string_view(text).substr(0, text.size() - (relative ? 1 : 0)));
-        if (!value || *value < 0 || (sign == Sign::positive && *value == 0)) refuseValue(name, text, allowed);
-        target = {*value, relative};
-      },
-      description);
-  option->type_name("LENGTH");
+  auto* option = addLength(
+      app, name, [&target](const Length& length) { target = length; }, description, sign);
   if (target.value > 0) option->default_str(fmt::format("{:g}{}", target.value, target.relative ? "%" : ""));
   return option;
 }
@@ -203,6 +240,13 @@ CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& targ
       description);
   option->type_name("FILE");
   return markOutput(option, trial);
+}
+
+void requireOneOutput(CLI::App& app, const std::vector<std::string>& names) {
+  app.callback([&app, names] {
+    if (std::ranges::none_of(names, [&](const std::string& name) { return app.count(name) > 0; }))
+      throw CLI::RequiredError(fmt::format("one of {}", fmt::join(names, ", ")));
+  });
 }
 
 CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,

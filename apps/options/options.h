@@ -30,7 +30,7 @@ struct Frequency {
   double perWorldUnit(double longestSide) const { return relative ? value / longestSide : value; }
 };
 
-enum class Sign { positive, notNegative };
+enum class Sign { positive, notNegative, any };
 
 /// Refuses the value `text` of an option declared as `name` ("-o,--output"), saying what is allowed.
 [[noreturn]] void refuseValue(const std::string& name, const std::string& text, const std::string& allowed);
@@ -41,6 +41,9 @@ enum class Sign { positive, notNegative };
 /// --help shows.
 CLI::Option* addLength(CLI::App& app, const std::string& name, Length& target, const std::string& description,
                        Sign sign = Sign::notNegative);
+/// The same, for a length that need not be given.
+CLI::Option* addLength(CLI::App& app, const std::string& name, std::optional<Length>& target,
+                       const std::string& description, Sign sign = Sign::notNegative);
 CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& target,
                           const std::string& description);
 /// "x,y,z"
@@ -98,6 +101,9 @@ CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& targ
                        const std::vector<std::string>& extensions, const std::string& description,
                        OutputTrial trial = OutputTrial::program);
 
+/// Refuses a command line that has none of the outputs `names` ("--output"), of which any one is enough.
+void requireOneOutput(CLI::App& app, const std::vector<std::string>& names);
+
 /// A list of input files, each with the option in front.
 CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::string>& target,
                        const std::string& description);
@@ -105,8 +111,14 @@ CLI::Option* addInputs(CLI::App& app, const std::string& name, std::vector<std::
 /// --repair, the same for every verb that takes a mesh.
 CLI::Option* addRepair(CLI::App& app, MeshRepairOptions::Mode& target);
 
+/// The length that all of `text` is, of any sign, or nothing.
+std::optional<Length> parseLength(std::string_view text);
+
 /// The finite number that all of `text` is, or nothing.
 std::optional<double> parseNumber(std::string_view text);
+
+/// The bytes, > 0, that "8G" or "512M" means, or nothing.
+std::optional<double> parseBytes(std::string_view text);
 
 /// The numbers of a comma-separated list, or a usage error that names `option`, `text` and the `form` wanted.
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, const std::string& form);

@@ -157,7 +157,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
   result.chooseByQuality(volume);
-  result.lights = light.resolved(run.memoryLimitBytes);
+  result.lights = light.resolved(result.seen.longestSide, run.memoryLimitBytes);
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");

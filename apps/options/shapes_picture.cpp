@@ -8,8 +8,6 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
-#include "nephele/render/image/exr_io.h"
-#include "nephele/render/image/png_io.h"
 #include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
@@ -44,6 +42,8 @@ bool areShapes(const std::vector<std::string>& paths) {
 
 void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
                         const PictureOptions& options, const PictureFiles& files, Run& run) {
+  if (!files.deep.empty())
+    throw CLI::ValidationError("--deep", "shows a volume; meshes and level sets alone have no deep picture");
   run.begin("read");
   std::vector<SurfaceObject> shapes = objects.shapes(inputs, run.memoryLimitBytes);
   SurfacePictureOptions shown;
@@ -52,11 +52,11 @@ void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOpti
     throw Error("meshes and level sets alone are shown without --f-stop, --lens-radius and --shutter");
   run.requireMemory(estimateSurfacePictureBytes(shown.camera->width(), shown.camera->height()),
                     "make the picture smaller (--size)");
-  const Image image = pictureSurfaces(std::move(shapes), shown, run);
+  RenderResult picture;
+  picture.image = pictureSurfaces(std::move(shapes), shown, run);
   run.begin("write");
-  writeExr(files.output, image, *shown.camera, run.metadata());
-  if (!files.preview.empty()) writePng(files.preview, image, options.screen, run.metadata());
-  run.result(fmt::format("{}: {}x{}, {} surface{}", files.output, shown.camera->width(),
+  files.write(picture, *shown.camera, options.screen, run.metadata());
+  run.result(fmt::format("{}: {}x{}, {} surface{}", files.name(), shown.camera->width(),
                          shown.camera->height(), inputs.size(), inputs.size() == 1 ? "" : "s"));
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/options/object_options.h"
+#include "apps/options/picture_files.h"
 
 namespace nephele::apps {
 
@@ -14,14 +15,9 @@ bool areShapes(const std::vector<std::string>& paths);
 /// Of meshes and level sets. @throws Error naming the file.
 Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run);
 
-/// Files of a picture: linear (.exr), and for the screen (.png) if there is to be one.
-struct PictureFiles {
-  std::string output, preview;
-};
-
 /// Writes a picture of meshes and level sets alone, shaded quickly in a light of their own. The camera, the
 /// view transform and the paint of objects are those of the options.
-/// @throws CLI::Error for a camera that cannot be, Error naming the file.
+/// @throws CLI::Error for a camera that cannot be or a deep picture, Error naming the file.
 void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
                         const PictureOptions& options, const PictureFiles& files, Run& run);
 

@@ -30,9 +30,10 @@ void addPictures(CLI::App& app, TransferArguments& a) {
       ->needs(bake);
   addCount(app, "--gutter", a.bake.gutter, 0, 1024, "Texels that continue the charts of the baked texture.")
       ->needs(bake);
-  CLI::Option* preview =
-      addOutput(app, "--preview", a.preview, {".png"},
-                "Picture of the reference and the object beside it, with the texture or a checker.");
+  CLI::Option* preview = addOutput(
+      app, "--preview", a.preview, {".png"},
+      "Picture of the reference and the object beside it, with the texture or a checker; may be the "
+      "only output.");
   addPreviewFrame(app, preview, a.picture.width, a.picture.height, a.picture.azimuthDegrees,
                   a.picture.elevationDegrees);
   addCount(app, "--checker", a.picture.checkers, 1, 10000,
@@ -47,7 +48,7 @@ void addPictures(CLI::App& app, TransferArguments& a) {
 
 /// Whether the format of `path` can hold `attribute`, once it is carried.
 bool holds(const std::string& path, const MeshAttribute& attribute) {
-  if (path.ends_with(".ply") || (attribute.name == "uv" && attribute.width == 2)) return true;
+  if (path.empty() || path.ends_with(".ply") || (attribute.name == "uv" && attribute.width == 2)) return true;
   return attribute.domain == MeshAttribute::Domain::vertex && attribute.name == "color" &&
          attribute.width >= 3;
 }
@@ -101,10 +102,19 @@ TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& obj
     return transfer;
   }
   if (!other.empty()) run.note(fmt::format("{} cannot hold {}, left out; a .ply can", output, listed(other)));
+  // Without the object all that is to be seen is how its coordinates lie.
+  const bool showsOwn = !preview.empty() && bakedTexture.empty() && !paintsDistortion;
+  if (output.empty()) return {showsOwn ? std::vector<std::string>{"uv"} : std::vector<std::string>{}};
   if (fit.empty() && bakedTexture.empty())
     throw Error(fmt::format("{}: has no attributes that {} can hold{}", from, output,
                             all.empty() ? "" : "; it has " + listed(all)));
   return {fit};
+}
+
+const std::string& TransferArguments::name() const {
+  for (const std::string* file : {&output, &preview, &bakedTexture, &warpFile})
+    if (!file->empty()) return *file;
+  return warpedMesh;
 }
 
 TextureBakeOptions TransferArguments::bakeOptions(const Image& image) const {
@@ -138,7 +148,7 @@ void addTransferOptions(CLI::App& app, TransferArguments& a) {
       ->required()
       ->type_name("FILE");
   app.add_option("--to", a.to, "Object: the mesh that gets them.")->required()->type_name("FILE");
-  addOutput(app, "-o,--output", a.output, {".obj", ".ply"}, "The object with the attributes.")->required();
+  addOutput(app, "-o,--output", a.output, {".obj", ".ply"}, "The object with the attributes.");
   addSubdivide(app, a.subdivide)
       ->description("Split every triangle of the object in four this often and round it (Loop) first.");
   app.add_option_function<std::string>(
@@ -178,6 +188,7 @@ void addTransferOptions(CLI::App& app, TransferArguments& a) {
   addOutput(app, "--warped-mesh", a.warpedMesh, {".obj", ".ply", ".stl"},
             "Write the reference's level set, warped, as a mesh.");
   addPictures(app, a);
+  requireOneOutput(app, {"--output", "--preview", "--bake-texture", "--warp", "--warped-mesh"});
 }
 
 }  // namespace nephele::apps

@@ -31,6 +31,8 @@ struct TransferArguments {
   /// What the preview shows: the attributes, or how well the map keeps shapes.
   bool paintsDistortion = false;
 
+  /// What messages call the result: the first of its files.
+  const std::string& name() const;
   /// The attributes to carry: those asked for, or all that the output can hold. Says what is left out.
   /// @throws Error naming a file that lacks what is asked for or cannot hold it.
   TransferOptions chosen(const Mesh& reference, const Mesh& object, const Run& run) const;

@@ -8,13 +8,15 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/image/png_io.h"
+#include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
 
 struct MeshOptions {
-  std::string input;
-  std::string output;
+  std::string input, output, preview;
+  SurfacePictureOptions picture{.azimuthDegrees = 25};
   IsosurfaceOptions isosurface;
   MeshProcessing processing;
 };
@@ -23,9 +25,14 @@ void bindOptions(CLI::App& app, MeshOptions& options) {
   app.add_option("input", options.input, "Volume to mesh (.vdb, .nvdb), or a mesh.")
       ->required()
       ->type_name("FILE");
-  addOutput(app, "-o,--output", options.output, {".obj", ".ply", ".stl"}, "Mesh to write.")->required();
+  addOutput(app, "-o,--output", options.output, {".obj", ".ply", ".stl"}, "Mesh to write.");
   addIsosurfaceOptions(app, options.isosurface);
   addMeshProcessing(app, options.processing);
+  CLI::Option* preview =
+      addOutput(app, "--preview", options.preview, {".png"}, "Picture of the mesh; may be the only output.");
+  addPreviewFrame(app, preview, options.picture.width, options.picture.height, options.picture.azimuthDegrees,
+                  options.picture.elevationDegrees);
+  requireOneOutput(app, {"--output", "--preview"});
 }
 
 Mesh readInput(const MeshOptions& options, Run& run) {
@@ -36,11 +43,17 @@ Mesh readInput(const MeshOptions& options, Run& run) {
 }
 
 void makeMesh(const MeshOptions& options, Run& run) {
+  if (!options.preview.empty())
+    run.requireMemory(estimateSurfacePictureBytes(options.picture.width, options.picture.height),
+                      "make the preview smaller (--size)");
   const Mesh mesh = namingFile(options.input, [&] {
     return options.processing.processed(readInput(options, run), options.input, run);
   });
   run.begin("write");
-  writeMesh(options.output, mesh);
+  if (!options.output.empty()) writeMesh(options.output, mesh);
+  if (!options.preview.empty())
+    writePng(options.preview, pictureSurfaces({{.mesh = mesh, .colour = kShapeColour}}, options.picture, run),
+             {}, run.metadata());
 
   run.begin("check");
   const MeshDiagnosis is = diagnose(mesh, run);
@@ -52,7 +65,8 @@ void makeMesh(const MeshOptions& options, Run& run) {
                             {"euler", is.eulerCharacteristic},
                             {"volume", is.volume},
                             {"area", is.area}});
-  run.result(fmt::format("{}: {} vertices, {} faces, {}", options.output, is.vertices, is.faces,
+  run.result(fmt::format("{}: {} vertices, {} faces, {}",
+                         options.output.empty() ? options.preview : options.output, is.vertices, is.faces,
                          is.closed() ? fmt::format("closed, volume {:g}", is.volume) : "not closed"));
 }
 

@@ -1,11 +1,10 @@
 #include <fmt/format.h>
 
 #include "apps/options/live_picture.h"
+#include "apps/options/picture_files.h"
 #include "apps/options/render_options.h"
 #include "apps/options/scene_options.h"
 #include "apps/options/shapes_picture.h"
-#include "nephele/render/image/exr_io.h"
-#include "nephele/render/image/png_io.h"
 
 namespace nephele::apps {
 namespace {
@@ -21,21 +20,21 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
       app, options.scene,
       "Densities to look at (.vdb, .nvdb); where they overlap they add up. Or meshes and level sets "
       "alone, shaded quickly in a light of their own.");
-  addOutput(app, "-o,--output", options.files.output, {".exr"}, "Picture to write: linear, premultiplied.")
-      ->required();
-  addOutput(app, "--preview", options.files.preview, {".png"}, "The same for the screen, before the sky.");
+  addPictureFiles(app, options.files);
   addPictureOptions(app, options.picture);
   addShadowOutput(app, options.picture.light);
   addSceneOptions(app, options.scene);
+  requireOneOutput(app, {"--output", "--preview", "--deep"});
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
   const SceneOptions& scene = options.scene;
+  const PictureFiles files{options.files.output, options.files.preview, scene.deep};
   PictureOptions picture = options.picture.withView();
   if (areShapes(scene.inputs))
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
-                              options.files, run);
+                              files, run);
   RenderVolume volume = scene.volume(options.picture, run);
   picture = picture.resolved(volume, run);
   scene.addTo(picture, volume, !options.files.preview.empty(), run);
@@ -46,22 +45,17 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
                     "make the picture smaller (--size), or the volume with larger voxels");
   picture.light.writeShadows(volume, picture.lights, picture.medium, run);
   if (!picture.needsSamples()) volume.giveUpSamples();
-  LivePicture live(picture.displayServer, options.files.output, picture.render);
+  LivePicture live(picture.displayServer, files.name(), picture.render);
   RenderResult result = picture.picture(volume, camera, run);
   picture.addSky(result.image, camera, picture.lights);
-  const auto metadata = picture.metadata(run);
   run.begin("write");
-  if (result.deep)
-    writeExrPair({options.files.output, scene.deep}, result.image, *result.deep, camera, metadata);
-  else
-    writeExr(options.files.output, result.image, camera, metadata);
-  if (!options.files.preview.empty()) writePng(options.files.preview, result.image, picture.screen, metadata);
+  files.write(result, camera, picture.screen, picture.metadata(run));
   live.complete(result.image);
   live.finish(run);
-  run.stats["values_not_finite"] = noteNotFinite(options.files.output, result.image, run);
+  run.stats["values_not_finite"] = noteNotFinite(files.name(), result.image, run);
   tellWork(result, run);
   run.stats["extinction"] = *picture.extinction;
-  run.result(fmt::format("{}: {}x{}, extinction {:g} per world unit", options.files.output, camera.width(),
+  run.result(fmt::format("{}: {}x{}, extinction {:g} per world unit", files.name(), camera.width(),
                          camera.height(), *picture.extinction));
 }
 

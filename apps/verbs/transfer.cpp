@@ -82,8 +82,8 @@ void transfer(const TransferArguments& arguments, Run& run) {
                  : pictureTransfer(reference, result, texture, baked, arguments.picture, run),
              {}, run.metadata());
   run.begin("write");
-  writeMesh(arguments.output, result);
-  reportTransfer(arguments.output, warp, quality, run);
+  if (!arguments.output.empty()) writeMesh(arguments.output, result);
+  reportTransfer(arguments.name(), warp, quality, run);
 }
 
 }  // namespace

@@ -10,10 +10,9 @@ namespace {
 
 void bindOptions(CLI::App& app, TurntableOptions& options) {
   addSceneInputs(app, options.scene, "Densities to look at (.vdb, .nvdb); where they overlap they add up.");
-  addOutput(app, "-o,--output", options.output, {".exr"},
-            "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.",
-            OutputTrial::verb)
-      ->required();
+  CLI::Option* output = addOutput(
+      app, "-o,--output", options.output, {".exr"},
+      "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.", OutputTrial::verb);
   app.add_option("--frames", options.frames,
                  "Frames to make: 1-48, 1001-1100x2,1150. The turn takes from the first to the last of them.")
       ->required()
@@ -32,13 +31,15 @@ void bindOptions(CLI::App& app, TurntableOptions& options) {
   addOutput(app, "--contact-sheet", options.contactSheet, {".png"}, "All frames, small, on one picture.",
             OutputTrial::verb);
   app.add_flag("--skip-existing", options.skipExisting,
-               "Keep the frames that are there and whole; without it all are made again.");
+               "Keep the frames that are there and whole; without it all are made again.")
+      ->needs(output);
   app.add_option("--only", options.only, "Make only those of --frames that are in this range, too.")
       ->type_name("FRAMES");
   app.add_option("--shard", options.shard, "Make the share of machine I of N (from 1): every N-th frame.")
       ->type_name("I/N");
   addPictureOptions(app, options.picture);
   addSceneOptions(app, options.scene, OutputTrial::verb);
+  requireOneOutput(app, {"--output", "--preview", "--movie", "--contact-sheet", "--deep"});
   options.app = &app;
 }
 
@@ -75,13 +76,9 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
   if (options.skipExisting) skipExisting(plan, start, run);
   makeFrames(plan, options, picture, volume, start, run);
-  makeMovieAndSheet(plan, options, picture, run);
-  for (const TurntableFrame& frame : plan.frames)
-    run.stats["frames"].push_back(
-        {{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}});
   run.stats["extinction"] = *picture.extinction;
   run.result(fmt::format("{}: {} frames, {} of them skipped, {}x{}, extinction {:g} per world unit",
-                         options.output, plan.frames.size(),
+                         options.name(), plan.frames.size(),
                          std::ranges::count_if(plan.frames, &TurntableFrame::skipped), width, height,
                          *picture.extinction));
 }

@@ -22,6 +22,9 @@ struct SurfacePictureOptions {
   int samples = 8;
 };
 
+/// Colour of objects that have none of their own, which suits the light of the picture.
+constexpr Vec3f kShapeColour{0.62f, 0.6f, 0.57f};
+
 /// Objects without a volume, standing on a ground that fades into the backdrop, in the soft light of a lamp
 /// and a sky. Channels R, G, B, A, linear, opaque. The same at any number of threads.
 /// @throws Error if there are no objects, one of them cannot be shown (see Surfaces) or an option is outside
