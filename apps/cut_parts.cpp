@@ -46,15 +46,17 @@ std::vector<CutPart> CutArguments::readParts(Run& run) const {
   // What a cut has made is whole, and may hold places that are equal and must not be merged.
   if (!isListed && !isVolumeFile(input)) {
     run.begin("repair");
+    MeshRepairOptions options = repair;
+    options.keepPolygons = geometry == Geometry::exact;
     for (CutPart& part : parts) {
-      RepairedMesh repaired = namingFile(input, [&] { return repairMesh(part.mesh, repair, run); });
+      RepairedMesh repaired = namingFile(input, [&] { return repairMesh(part.mesh, options, run); });
       for (const std::string& what : repaired.repairs)
         run.note(parts.size() > 1 ? fmt::format("{}: {}", part.name, what) : what);
       part.mesh = std::move(repaired.mesh);
     }
   }
   std::size_t triangles = 0;
-  for (const CutPart& part : parts) triangles += part.mesh.faceCount();
+  for (const CutPart& part : parts) triangles += part.mesh.corners.size() - 2 * part.mesh.faceCount();
   // Of a cut, its pieces and their text.
   constexpr double kBytesPerTriangle = 1500;
   run.requireMemory(kBytesPerTriangle * double(triangles), "cut a coarser mesh");

@@ -7,10 +7,17 @@
 namespace nephele::apps {
 namespace {
 
+/// Of the volume.
+double sliverShare(const Pieces& pieces) {
+  return pieces.volumeOriginal > 0 ? pieces.sliverVolume / pieces.volumeOriginal : 0;
+}
+
 void reportKnives(const Pieces& pieces, const CutKnives& knives, Run& run) {
   if (pieces.slivers > 0)
-    run.note(fmt::format("{} {} left out, too small, of volume {:g} together", pieces.slivers,
-                         pieces.slivers == 1 ? "part" : "parts", pieces.sliverVolume));
+    run.note(
+        fmt::format("{} {} left out, too small, {:.2g} % of the volume together; --min-volume 0 keeps {}",
+                    pieces.slivers, pieces.slivers == 1 ? "part" : "parts", 100 * sliverShare(pieces),
+                    pieces.slivers == 1 ? "it" : "them"));
   std::vector<std::string> missing;
   for (std::size_t k = 0; k < knives.names.size(); ++k) {
     const auto side = [&](const Piece& piece) { return piece.code.sides[k]; };
@@ -47,7 +54,8 @@ void report(const Pieces& pieces, const CutKnives& knives, Run& run) {
   run.stats["volume_original"] = pieces.volumeOriginal;
   run.stats["volume_sum"] = pieces.volumeSum;
   run.stats["levelsets_nonempty"] = pieces.codes;
-  run.stats["slivers"] = {{"count", pieces.slivers}, {"volume", pieces.sliverVolume}};
+  run.stats["slivers"] = {
+      {"count", pieces.slivers}, {"volume", pieces.sliverVolume}, {"share", sliverShare(pieces)}};
 }
 
 void reportCrossings(std::size_t crossings, Run& run) {

@@ -62,10 +62,10 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
   if (result.names.empty() && knives.cells.empty())
     throw CLI::ValidationError("no knife", "give --plane, --random-planes, --knife, --voronoi or --points");
   result.options.kerf = float(a.kerf.worldUnits(side));
-  if (a.minVolume.value > 0) {
+  if (a.minVolume) {
     double whole = 0;
     for (const CutPart& part : parts) whole += signedVolume(part.mesh);
-    result.options.minVolume = a.minVolume.worldUnits(whole);
+    result.options.minVolume = a.minVolume->worldUnits(whole);
   }
   result.voxelSize = a.voxelSize.value > 0 ? a.voxelSize.worldUnits(side) : side / a.resolution;
   if (a.voxelSize.value == 0 && a.resolutionOption->count() == 0 && parts[0].level)

@@ -6,8 +6,9 @@ namespace nephele::apps {
 namespace {
 
 void addPicture(CLI::App& app, CutArguments& a) {
-  auto* preview = addOutput(app, "--preview", a.preview, {".png"},
-                            "Picture of the pieces, moved apart, each in a colour of its own.");
+  auto* preview =
+      addOutput(app, "--preview", a.preview, {".png"},
+                "Picture of the pieces, moved apart, each in a colour of its own; may be the only output.");
   addPreviewFrame(app, preview, a.picture.width, a.picture.height, a.picture.azimuthDegrees,
                   a.picture.elevationDegrees);
 }
@@ -18,9 +19,9 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
   app.add_option("input", a.input, "Mesh or level set (.vdb) to cut, or a folder of pieces to cut again.")
       ->required()
       ->type_name("FILE");
-  markOutput(app.add_option("-o,--output", a.folder, "Folder for the pieces."), OutputTrial::verb)
-      ->required()
-      ->type_name("FOLDER");
+  auto* folder =
+      markOutput(app.add_option("-o,--output", a.folder, "Folder for the pieces."), OutputTrial::verb)
+          ->type_name("FOLDER");
 
   addPlanes(app, a.planes);
   auto* random =
@@ -64,11 +65,12 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
   using Format = PieceFilesOptions::Format;
   addChoice<Format>(app, "--format", a.format, {{"obj", Format::obj}, {"ply", Format::ply}},
                     "Of the pieces' meshes; PLY has no groups.");
-  app.add_flag("--vdb", a.levelSets, "Also write pieces.vdb, a level set of each piece.");
+  app.add_flag("--vdb", a.levelSets, "Also write pieces.vdb, a level set of each piece.")->needs(folder);
   addOptional(
       app, "--explode", a.explode, 0, 1000,
       "Also write exploded.obj: pieces moved apart, by this share of their distance from the middle.");
   addPicture(app, a);
+  requireOneOutput(app, {"--output", "--preview"});
 }
 
 }  // namespace nephele::apps

@@ -25,8 +25,8 @@ struct CutArguments {
   Frequency roughnessFrequency{5, true};
   std::vector<std::string> knifeFiles;
   std::optional<double> explode;
-  /// Volume, or a share of the whole in percent.
-  Length minVolume;
+  /// Volume, or a share of the whole in percent; the library's default if not given.
+  std::optional<Length> minVolume;
   Geometry geometry = Geometry::exact;
   PieceFilesOptions::Format format = PieceFilesOptions::Format::obj;
   MeshRepairOptions repair;

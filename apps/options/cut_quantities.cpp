@@ -1,5 +1,7 @@
 #include "apps/options/cut_quantities.h"
 
+#include <fmt/format.h>
+
 namespace nephele::apps {
 
 void addPlanes(CLI::App& app, std::vector<BladePlane>& planes) {
@@ -23,19 +25,21 @@ void addPlanes(CLI::App& app, std::vector<BladePlane>& planes) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
-void addVolume(CLI::App& app, Length& target) {
+void addVolume(CLI::App& app, std::optional<Length>& target) {
   app.add_option_function<std::string>(
          "--min-volume",
          [&target](const std::string& text) {
-           const bool relative = text.ends_with('%');
-           const auto value = parseNumber(std::string_view(text).substr(0, text.size() - (relative ? 1 : 0)));
-           if (!value || *value < 0)
+           const auto volume = parseLength(text);
+           if (!volume || volume->value < 0)
              refuseValue("--min-volume", text, "a volume >= 0 in world units or percent of the whole (0.1%)");
-           target = {*value, relative};
+           target = volume;
          },
-         "Leave out pieces that are smaller: world units cubed, or percent of the whole.")
+         fmt::format(
+             "Leave out pieces that are smaller: world units cubed, or percent of the whole; 0 keeps all. "
+             "Splinters have less than {:g} % of the median piece and {:g} % of the whole.",
+             100 * kSplinterOfMedian, 100 * kSplinterOfWhole))
       ->type_name("VOLUME")
-      ->default_str("0, or a voxel of level sets");
+      ->default_str("splinters, or a voxel of level sets");
 }
 
 }  // namespace nephele::apps

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "apps/options/options.h"
+#include "nephele/levelset/cut/cut.h"
 #include "nephele/modeling/shape/knives.h"
 
 namespace nephele::apps {
@@ -11,6 +13,6 @@ namespace nephele::apps {
 void addPlanes(CLI::App& app, std::vector<BladePlane>& planes);
 
 /// --min-volume: a volume in world units, or in percent of the whole.
-void addVolume(CLI::App& app, Length& target);
+void addVolume(CLI::App& app, std::optional<Length>& target);
 
 }  // namespace nephele::apps

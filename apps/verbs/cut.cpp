@@ -17,6 +17,7 @@ namespace {
 Pieces cutAsLevelSets(std::vector<CutPart>& parts, const CutKnives& knives, Run& run) {
   for (CutPart& part : parts) {
     const MeshToLevelSetOptions options{.voxelSize = knives.voxelSize};
+    if (!part.level) part.mesh = triangulated(part.mesh);
     run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
                       "use larger voxels (a lower --resolution or a larger --voxel-size)");
     if (!part.level)
@@ -38,7 +39,7 @@ void requirePiecesMemory(const Knives& knives, std::size_t parts, const Run& run
 
 void cut(const CutArguments& arguments, Run& run) {
   // Says now what could not be written in the end.
-  requireWritableFolder(arguments.folder);
+  if (!arguments.folder.empty()) requireWritableFolder(arguments.folder);
   if (!arguments.preview.empty())
     run.requireMemory(estimateSurfacePictureBytes(arguments.picture.width, arguments.picture.height),
                       "make the preview smaller (--size)");
@@ -60,16 +61,17 @@ void cut(const CutArguments& arguments, Run& run) {
   report(pieces, knives, run);
 
   run.begin("write");
-  writePieces(pieces, arguments.files(knives, run), run);
+  if (!arguments.folder.empty()) writePieces(pieces, arguments.files(knives, run), run);
   if (!arguments.preview.empty()) {
     PiecesPictureOptions picture = arguments.picture;
     picture.explode = arguments.explode.value_or(picture.explode);
     writePng(arguments.preview, picturePieces(pieces, picture, run), {}, run.metadata());
   }
   reportCrossings(crossings.get(), run);
-  run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})", arguments.folder, pieces.pieces.size(),
-                         pieces.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces",
-                         pieces.volumeSum, pieces.volumeOriginal));
+  run.result(fmt::format(
+      "{}: {} {}, volume {:g} (of {:g})", arguments.folder.empty() ? arguments.preview : arguments.folder,
+      pieces.pieces.size(), pieces.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces",
+      pieces.volumeSum, pieces.volumeOriginal));
 }
 
 }  // namespace

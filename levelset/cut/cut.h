@@ -15,10 +15,15 @@ namespace nephele {
 struct CutOptions {
   /// Width of the cut, world units, >= 0: half of it goes from each side of every knife.
   float kerf = 0.0f;
-  /// Pieces with less volume are left out and counted, world units cubed, >= 0. Default: 0 for meshes, where
-  /// those below 1e-12 of the whole always are; a voxel for level sets.
+  /// Pieces with less volume are left out and counted, world units cubed, >= 0. Default: splinters of meshes,
+  /// less than a voxel of level sets. Of meshes those below 1e-12 of the whole always are.
   std::optional<double> minVolume{};
 };
+
+/// A piece is a splinter if it has less than these shares of the median piece and of what was cut. Measured
+/// on 35 cuts of five models by planes, cells and rough blades: up to 14 % of the pieces of planes, up to 4 %
+/// of those of cells, and never more than 6e-6 of the volume together.
+inline constexpr double kSplinterOfMedian = 1e-3, kSplinterOfWhole = 1e-6;
 
 /// Where two pieces touch.
 struct PieceContact {
@@ -31,7 +36,8 @@ struct PieceContact {
 struct Piece {
   /// Of cuts of parts only, see cut_parts.h: what it is called, and the piece that it was cut from, if any.
   std::string name{}, parent{};
-  /// Closed triangles. Empty where a field was cut into level sets.
+  /// Closed. Faces of a mesh that no knife crosses are the polygons that they were, all others triangles; a
+  /// piece that touches itself along an edge has triangles only. Empty where a field was cut into level sets.
   ///
   /// Outer faces come first, by the groups of the source; what the knives made is the last group, `inside`.
   /// Of meshes, corner attributes are those of the source, on cut faces read at the place of the corner in

@@ -45,9 +45,9 @@ std::vector<Vec3f> scatteredPoints(std::span<const CutPart> parts, int count, st
     const Box box = boundingBox(parts[i].mesh);
     const double voxel = double(box.longestSide()) / kResolution;
     const ScalarField inside =
-        parts[i].level
-            ? gridField(parts[i].level)
-            : meshDistance(parts[i].mesh, {.voxelSize = voxel, .exteriorBand = voxel, .interiorBand = voxel});
+        parts[i].level ? gridField(parts[i].level)
+                       : meshDistance(triangulated(parts[i].mesh),
+                                      {.voxelSize = voxel, .exteriorBand = voxel, .interiorBand = voxel});
     const auto some = scatteredPoints(inside, box, int(until - last), seed + std::uint32_t(i));
     points.insert(points.end(), some.begin(), some.end());
     last = until;

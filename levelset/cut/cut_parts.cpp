@@ -27,8 +27,9 @@ namespace {
 using detail::ContactAreas;
 using detail::kInsideGroup;
 
+/// Of a triangle.
 Vec3d cornerOf(const Mesh& mesh, std::size_t face, std::size_t k) {
-  return mesh.positions[mesh.corners[3 * face + k]];
+  return mesh.positions[mesh.face(face)[k]];
 }
 
 Vec3d middleOf(const Mesh& mesh, std::size_t face) {
@@ -106,8 +107,8 @@ void findNeighbours(std::vector<Piece>& pieces) {
     const Mesh& mesh = pieces[p].mesh;
     low = min(low, pieces[p].boxMin);
     high = max(high, pieces[p].boxMax);
-    if (!mesh.isTriangles()) continue;
     forInnerFaces(mesh, [&](std::size_t f) {
+      if (mesh.face(f).size() != 3) return;
       const Vec3d middle = middleOf(mesh, f);
       triangles.push_back({dot(middle, kAcross), middle, length(normalOf(mesh, f)) / 2, p});
     });

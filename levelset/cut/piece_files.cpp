@@ -228,7 +228,8 @@ class PieceWriter {
     writeVdbFile(folder_.temporary(index), all, options_.metadata);
   }
 
-  static VoxelGrid<float> levelOf(const Mesh& mesh, double voxelSize) {
+  static VoxelGrid<float> levelOf(const Mesh& polygons, double voxelSize) {
+    const Mesh mesh = triangulated(polygons);
     const detail::BandOptions options{.voxelSize = voxelSize};
     auto band = detail::signedBand(detail::surfaceGeometry(mesh), options, silent());
     return band ? *std::move(band) : detail::floodedBand(mesh, options, silent());

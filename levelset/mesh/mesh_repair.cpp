@@ -75,6 +75,8 @@ class Ladder {
     // Before polygons become fans: two that coincide may be cut along different diagonals.
     if (options_.mode == MeshRepairOptions::Mode::automatic && result_.before.duplicateFaces > 0)
       dropDuplicates();
+    Mesh polygons;
+    if (options_.keepPolygons && !result_.mesh.isTriangles()) polygons = result_.mesh;
     result_.mesh = triangulated(result_.mesh);
     switch (options_.mode) {
       case MeshRepairOptions::Mode::off:
@@ -97,6 +99,7 @@ class Ladder {
                             ? ", or holds nothing"
                             : fmt::format(" ({})", joined(result_.after.problems()))));
     if (isThin(result_.after)) failThin(result_.after);
+    if (result_.repairs.empty() && polygons.faceCount() > 0) result_.mesh = std::move(polygons);
     return std::move(result_);
   }
 

@@ -74,10 +74,12 @@ struct MeshRepairOptions {
   /// in proportion. Where the wrap of an open surface would be a shell that they cannot hold, one up to four
   /// times as coarse that is a solid takes its place; where there is none, the mesh is refused.
   std::optional<double> voxelSize{};
+  /// Leaves polygons as they are where nothing has to be repaired.
+  bool keepPolygons = false;
 };
 
-/// A closed, outward-oriented triangle mesh without equal positions, and what was done to get there, in
-/// words.
+/// A closed, outward-oriented mesh without equal positions, of triangles unless polygons were to be kept, and
+/// what was done to get there, in words.
 struct RepairedMesh {
   Mesh mesh;
   std::vector<std::string> repairs;

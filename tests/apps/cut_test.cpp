@@ -188,7 +188,7 @@ TEST_F(CutVerb, OuterFacesOfSpotKeepTheirTextureCoordinates) {
   for (const std::string knives :
        {"--random-planes 5 --seed 2", "--voronoi 12", "--random-planes 2 --roughness 1%"}) {
     SCOPED_TRACE(knives);
-    cut(path + " " + knives);
+    cut(path + " --min-volume 0 " + knives);
     std::vector<Mesh> meshes;
     for (const json& p : listedPieces()) meshes.push_back(piece(p["file"]));
     std::vector<Face> faces;
@@ -311,6 +311,55 @@ TEST_F(CutVerb, SliversAreLeftOutAndCounted) {
   EXPECT_EQ(stats()["pieces"].size(), 2u);
   cut(box() + corner + " --min-volume 0.01%");
   EXPECT_EQ(stats()["pieces"].size(), 1u);
+}
+
+// Of a cube of 8, a corner of 0.02^3 / 6: 1.7e-7 of it.
+TEST_F(CutVerb, SplintersAreLeftOutUnlessTheyAreAskedFor) {
+  const std::string corner = " --plane 0.98,1,1,1,1,1 --plane 0,0,0,1,0,0";
+  const ProgramResult result = cut(box() + corner);
+  EXPECT_EQ(stats()["pieces"].size(), 2u);
+  EXPECT_EQ(stats()["slivers"]["count"], 1);
+  EXPECT_NEAR(stats()["slivers"]["share"], 1e-6 / 6, 1e-12);
+  EXPECT_EQ(list()["slivers"]["count"], 1);
+  EXPECT_NE(
+      result.errors.find("1 part left out, too small, 1.7e-05 % of the volume together; --min-volume 0"),
+      std::string::npos)
+      << result.errors;
+  const ProgramResult all = cut(box() + corner + " --min-volume 0");
+  EXPECT_EQ(stats()["pieces"].size(), 3u);
+  EXPECT_EQ(all.errors.find("left out"), std::string::npos) << all.errors;
+  // A level set has no piece smaller than a voxel, unless it is asked to.
+  const std::string levels = " --geometry levelset --resolution 60 --plane 0.95,1,1,1,1,1 ";
+  cut(box() + levels);
+  const std::size_t few = stats()["pieces"].size();
+  cut(box() + levels + "--min-volume 0");
+  EXPECT_GE(stats()["pieces"].size(), few);
+  EXPECT_EQ(stats()["slivers"]["count"], 0);
+}
+
+TEST_F(CutVerb, QuadsAreKeptInFilesAndWhenPiecesAreCutAgain) {
+  textFile("quads.obj",
+           "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
+           "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 3/2 4/3 2/4\nf 5/1 6/2 8/3 7/4\nf 1/1 2/2 6/3 5/4\n"
+           "f 3/1 7/2 8/3 4/4\nf 1/1 5/2 7/3 3/4\nf 2/1 4/2 8/3 6/4\n");
+  const auto quadsOf = [](const Mesh& mesh) {
+    std::size_t quads = 0;
+    for (std::size_t f = 0; f < mesh.faceCount(); ++f) quads += mesh.face(f).size() == 4;
+    return quads;
+  };
+  cut(file("quads.obj") + " --plane 0,0.5,0,0,1,0 --vdb --resolution 20");
+  for (const char* name : {"piece_0001.obj", "piece_0002.obj"}) {
+    const Mesh mesh = piece(name);
+    EXPECT_EQ(quadsOf(mesh), 1u) << name;
+    EXPECT_TRUE(topologyOf(mesh).isClosedManifold()) << name;
+    EXPECT_EQ(attributeOf(mesh, "uv").values.size(), 2 * mesh.corners.size());
+  }
+  EXPECT_EQ(quadsOf(piece("pieces.obj")), 2u);
+  cut(file("out") + " --plane 0,0,0,0,1,0 --format ply");
+  EXPECT_EQ(quadsOf(piece("piece_0001_0001.ply")), 1u);
+  EXPECT_EQ(quadsOf(piece("piece_0002.ply")), 1u);
+  cut(file("out") + " --plane 0.1,0,0,1,0,0 --geometry levelset --resolution 20");
+  EXPECT_GT(stats()["pieces"].size(), 3u);
 }
 
 }  // namespace

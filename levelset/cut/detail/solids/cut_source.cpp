@@ -39,7 +39,7 @@ std::size_t openEdges(const std::vector<TriangleIndices>& triangles) {
   return open;
 }
 
-CutSource::CutSource(const Mesh& mesh, const std::string& name) : mesh_(triangulated(mesh)) {
+CutSource::CutSource(const Mesh& mesh, const std::string& name) : mesh_(triangulated(mesh)), polygons_(mesh) {
   require(mesh_.faceCount() > 0, fmt::format("cut: {} has no faces", name));
   require(mesh_.faceCount() < kSourceEdge,
           fmt::format("cut: {} has more than 1 073 741 823 triangles", name));
@@ -116,6 +116,20 @@ CutSource::Weights CutSource::weightsAt(std::uint32_t triangle, const Vec3d& p) 
   return {1 - wb - wc, wb, wc};
 }
 
+PolygonFans::Whole CutSource::wholeAt(const SolidSplitter& splitter, const SolidTriangle& t,
+                                      std::uint32_t face) const {
+  if (isInner(t.face)) return {};
+  const std::uint32_t triangle = faceOf_[t.face];
+  for (std::uint32_t first = 0; first < 3; ++first) {
+    bool isSame = true;
+    for (std::uint32_t k = 0; k < 3; ++k)
+      isSame &= splitter.position(t.vertices[(first + k) % 3]) ==
+                mesh_.positions[mesh_.corners[3 * std::size_t(triangle) + k]];
+    if (isSame) return {triangle, 3 * face + first};
+  }
+  return {};
+}
+
 ShellMesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell) const {
   std::vector<std::uint32_t> order(shell.triangles.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -145,6 +159,13 @@ ShellMesh CutSource::meshOf(const SolidSplitter& splitter, const Shell& shell) c
   for (const MeshAttribute& attribute : mesh_.attributes)
     addAttribute(attribute, splitter, shell, order, mesh);
   if (!hasUv(mesh_)) addAttribute({"uv", MeshAttribute::Domain::corner, 2, {}}, splitter, shell, order, mesh);
+  // What touches itself is split along edges of triangles.
+  if (shell.crowded.empty() && polygons_.any()) {
+    std::vector<PolygonFans::Whole> wholes;
+    for (std::uint32_t i = 0; i < order.size(); ++i)
+      wholes.push_back(wholeAt(splitter, shell.triangles[order[i]], i));
+    result.firstInside = polygons_.join(mesh, wholes)[result.firstInside];
+  }
   if (shell.crowded.empty()) return result;
   std::vector<std::uint32_t> placeOf(order.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) placeOf[order[i]] = i;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "nephele/levelset/cut/detail/solids/knife_sheets.h"
+#include "nephele/levelset/cut/detail/solids/polygon_fans.h"
 #include "nephele/levelset/cut/detail/solids/solid_split.h"
 #include "nephele/levelset/cut/detail/solids/solid_triangles.h"
 #include "nephele/modeling/base/mesh.h"
@@ -41,7 +42,8 @@ class CutSource {
   /// How near to a plane a point is on it: 1e-11 of the size, and above rounding.
   double tolerance() const { return tolerance_; }
 
-  /// A shell as a mesh, with attributes and groups.
+  /// A shell as a mesh, with attributes and groups. Polygons of the source that it holds whole are polygons
+  /// again.
   ShellMesh meshOf(const SolidSplitter& splitter, const Shell& shell) const;
 
  private:
@@ -50,12 +52,14 @@ class CutSource {
   bool isInner(std::uint32_t face) const { return (face & kOnPlane) != 0 || (faceOf_[face] & kOnPlane) != 0; }
   std::uint32_t groupOf(std::uint32_t face) const;
   PlaneFrame frameOf(const SolidSplitter& splitter, std::uint32_t face) const;
+  PolygonFans::Whole wholeAt(const SolidSplitter& splitter, const SolidTriangle& t, std::uint32_t face) const;
   Weights weightsAt(std::uint32_t triangle, const Vec3d& p) const;
   void addAttribute(const MeshAttribute& attribute, const SolidSplitter& splitter, const Shell& shell,
                     const std::vector<std::uint32_t>& order, Mesh& mesh) const;
 
   /// Triangulated, as it came.
   Mesh mesh_;
+  PolygonFans polygons_;
   std::vector<Vec3d> positions_;
   /// Of `mesh_`, without those that have no area by their indices, with equal positions merged if that closes
   /// the mesh; or what was carved.

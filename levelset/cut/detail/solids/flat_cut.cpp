@@ -330,6 +330,7 @@ Pieces piecesOf(const CutSource& source, std::span<const Carved::Part> parts, co
         }
       },
       progress);
+  if (!options.minVolume) dropSplinters(assemblies, source.volume());
   return gathered(std::move(assemblies));
 }
 

@@ -77,6 +77,33 @@ Assembly assemble(const CutSource& source, const SolidSplitter& splitter, Solid&
   return result;
 }
 
+void dropSplinters(std::vector<Assembly>& assemblies, double whole) {
+  std::vector<double> volumes;
+  for (const Assembly& assembly : assemblies)
+    for (const Piece& piece : assembly.pieces) volumes.push_back(piece.mass.volume);
+  if (volumes.empty()) return;
+  const auto middle = volumes.begin() + std::ptrdiff_t(volumes.size() / 2);
+  std::nth_element(volumes.begin(), middle, volumes.end());
+  const double least = std::min(kSplinterOfMedian * *middle, kSplinterOfWhole * whole);
+  for (Assembly& assembly : assemblies) {
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < assembly.pieces.size(); ++k) {
+      if (assembly.pieces[k].mass.volume < least) {
+        ++assembly.slivers;
+        assembly.sliverVolume += assembly.pieces[k].mass.volume;
+        continue;
+      }
+      if (kept != k) {
+        assembly.pieces[kept] = std::move(assembly.pieces[k]);
+        assembly.inner[kept] = std::move(assembly.inner[k]);
+      }
+      ++kept;
+    }
+    assembly.pieces.resize(kept);
+    assembly.inner.resize(kept);
+  }
+}
+
 Pieces gathered(std::vector<Assembly> assemblies) {
   Pieces result;
   std::vector<InnerTriangle> inner;

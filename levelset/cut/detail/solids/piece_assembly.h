@@ -28,6 +28,9 @@ struct Assembly {
 Assembly assemble(const CutSource& source, const SolidSplitter& splitter, Solid& solid, const PieceCode& code,
                   double minVolume);
 
+/// Leaves out the splinters among all pieces, see kSplinterOfMedian; `whole`: the volume of what was cut.
+void dropSplinters(std::vector<Assembly>& assemblies, double whole);
+
 /// All pieces, in their order, and which of them touch.
 Pieces gathered(std::vector<Assembly> assemblies);
 
