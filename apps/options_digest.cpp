@@ -16,27 +16,6 @@
 namespace nephele::apps {
 namespace {
 
-/// A 64 bit FNV-1a hash.
-class Hash {
- public:
-  void add(std::string_view bytes) {
-    for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
-    // So that "ab", "c" and "a", "bc" differ.
-    value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
-  }
-  /// A file by what it holds, wherever it is.
-  void addFile(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::vector<char> block(std::size_t(1) << 20);
-    while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
-      add({block.data(), std::size_t(file.gcount())});
-  }
-  std::string text() const { return fmt::format("{:016x}", value_); }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325u;
-};
-
 /// How the program runs. What --config and --look set counts as if it were typed.
 constexpr std::string_view kHow[]{"config",       "look",           "skip-existing", "threads",
                                   "memory-limit", "display-server", "quiet",         "verbose",
@@ -63,9 +42,26 @@ std::string digestOfVolume(const std::string& path) {
 
 }  // namespace
 
+void ContentHash::add(std::string_view bytes) {
+  for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
+  // So that "ab", "c" and "a", "bc" differ.
+  value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
+}
+
+void ContentHash::addFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> block(std::size_t(1) << 20);
+  while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
+    add({block.data(), std::size_t(file.gcount())});
+}
+
+std::string ContentHash::text() const {
+  return fmt::format("{:016x}", value_);
+}
+
 std::string optionsDigest(const CLI::App& app, std::span<const std::string_view> others,
                           const std::string& more) {
-  Hash hash;
+  ContentHash hash;
   hash.add(NEPHELE_VERSION);
   hash.add(app.get_name());
   hash.add(more);

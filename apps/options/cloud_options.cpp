@@ -30,7 +30,9 @@ FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
   }
   return {mesh,
           {.voxelSize = voxel(longestSide),
-           .reach = std::min(kHighest * rms, longestSide) + edgeThickness.largestInWorldUnits(longestSide),
+           .reach = std::min(kHighest * rms, longestSide) +
+                    2 * double(cloudEdgeReach(float(edgeThickness.largestInWorldUnits(longestSide)),
+                                              float(voxel(longestSide)))),
            .seed = seed},
           run};
 }
@@ -67,6 +69,20 @@ Extent CloudArguments::extent(Run& run) const {
   only.meshOutput.clear();
   const Box box = boundingBox(only.shape(run));
   return {box, double(box.longestSide())};
+}
+
+std::vector<std::string> CloudArguments::maskFiles() const {
+  std::vector<std::string> files;
+  const auto add = [&](const FieldValue& value) {
+    if (value.source == FieldValue::Source::mask) files.push_back(value.path);
+  };
+  for (const FieldValue* value : {&amplitude, &frequency, &lacunarity, &roughness, &billow, &billowScale})
+    add(*value);
+  for (const LayerRecipe& layer : recipe)
+    for (const auto* value :
+         {&layer.amplitude, &layer.frequency, &layer.billow, &layer.billowScale, &layer.mask})
+      if (*value) add(**value);
+  return files;
 }
 
 std::string CloudArguments::noiseOf(std::size_t index) const {
@@ -128,6 +144,7 @@ void addCloudOptions(CLI::App& app, CloudArguments& a) {
   addFieldValue(app, "--edge-thickness", a.edgeThickness, "Width over which density rises to 1.");
   addDensityOptions(app, a.density);
   addCloudAdvectionOptions(app, a.advection);
+  addCloudCacheOptions(app, a.cache);
   addCount(app, "--seed", a.seed, 0, 1 << 30, "Another seed is another cloud of the same kind.");
   app.add_flag("--half", a.halfFloat, "Save 16-bit values.");
 }

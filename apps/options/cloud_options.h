@@ -4,6 +4,7 @@
 
 #include "apps/app.h"
 #include "apps/options/cloud_advection.h"
+#include "apps/options/cloud_cache.h"
 #include "apps/options/cloud_quantities.h"
 #include "apps/options/density_options.h"
 #include "apps/options/layer_recipe.h"
@@ -17,6 +18,7 @@ struct CloudArguments {
   ShapeArguments shape;
   DensityArguments density;
   CloudAdvectionArguments advection;
+  CloudCacheArguments cache;
   std::string output, surface;
   Length voxelSize;
   int resolution = 256, seed = 0;
@@ -47,6 +49,8 @@ struct CloudArguments {
   CloudOptions resolved(FieldSources& sources, const Run& run) const;
   /// Of the shape. @throws Error naming the file.
   Extent extent(Run& run) const;
+  /// Files that the parameters of the layers are read from, beside the recipe.
+  std::vector<std::string> maskFiles() const;
   /// What noise layer `index` has: "worley, 3 octaves".
   std::string noiseOf(std::size_t index) const;
 };

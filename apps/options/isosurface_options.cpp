@@ -38,8 +38,7 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
     refuseValue(
         "--isovalue", fmt::format("{:g}%", isovalue.value),
         fmt::format("a number; grid '{}' is no level set, so that its values are no lengths", info.name));
-  const double side =
-      isovalue.relative ? double(boundingBox(marchingCubes(*toBricks(file))).longestSide()) : 0.0;
+  const double side = isovalue.relative ? run.longestSide(boundingBox(marchingCubes(*toBricks(file)))) : 0.0;
   const double level = isovalueOption->count() > 0 ? isovalue.worldUnits(side) : isLevelSet ? 0.0 : 0.5;
   run.stats["mesh"] = {{"isovalue", level}};
 

@@ -91,8 +91,7 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
   if (ground) {
     const Box& box = seen.box;
     const Length height = groundHeight.value_or(Length{0, true});
-    const double y =
-        height.worldUnits(seen.longestSide) + (height.relative ? double(box.min.y) : 0.0);
+    const double y = height.worldUnits(seen.longestSide) + (height.relative ? double(box.min.y) : 0.0);
     all.push_back({.mesh = groundPlane(box.center(), float(y), 200 * box.longestSide()),
                    .colour = groundColour,
                    .castsShadows = false});

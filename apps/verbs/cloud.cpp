@@ -62,7 +62,8 @@ void growCloud(const CloudArguments& arguments, Run& run) {
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
   // Distance, layers, density and perhaps the surface.
   run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
-  Cloud cloud = namingFile(arguments.shape.input, [&] { return makeCloud(shape, options, run); });
+  Cloud cloud = namingFile(arguments.shape.input,
+                           [&] { return arguments.cache.grown(shape, arguments, options, run); });
   run.expect(0.9, 1, 2);
   const auto fileOf = [&](VoxelGrid<float>& grid, const char* name, VdbGridInfo::Class gridClass) {
     return toVdb(std::move(grid), {name, gridClass, arguments.halfFloat});

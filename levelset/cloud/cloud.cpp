@@ -82,13 +82,15 @@ RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair,
   });
 }
 
-Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+namespace {
+
+GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
   requireValid(mesh);
   require(options.voxelSize > 0,
           "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
   const std::vector<CumuloLayer>& layers = options.layers;
-  const float edge = thickestEdge(options) / 2;
+  const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);
   const float reach = cumuloExteriorBand(layers, options.voxelSize, edge);
   require(reach <= kFarthestVoxels * options.voxelSize,
           fmt::format("the layers move the surface by up to {:.3g}, which is {:.3g} voxels, allowed: up to "
@@ -100,24 +102,54 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
                                          .exteriorBand = reach,
                                          .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)},
                                         progress);
-  GriddedCumulo cumulo = griddedCumulo(base, layers,
-                                       {.voxelSize = options.voxelSize,
-                                        .box = boundingBox(mesh),
-                                        .newtonSteps = options.newtonSteps,
-                                        .edge = edge,
-                                        .closestPoint = closestPoint(mesh),
-                                        .medialSmoothing = options.medialSmoothing,
-                                        .renormalise = options.renormalise},
-                                       progress);
-  Cloud cloud{cloudDensity(cumulo,
-                           {.voxelSize = options.voxelSize,
-                            .edgeThickness = options.edgeThickness,
-                            .edgeExponent = options.edgeExponent,
-                            .factor = options.densityFactor},
-                           progress),
-              {},
-              std::move(cumulo.layers)};
+  return griddedCumulo(base, layers,
+                       {.voxelSize = options.voxelSize,
+                        .box = boundingBox(mesh),
+                        .newtonSteps = options.newtonSteps,
+                        .edge = edge,
+                        .closestPoint = closestPoint(mesh),
+                        .medialSmoothing = options.medialSmoothing,
+                        .renormalise = options.renormalise},
+                       progress);
+}
+
+CloudDensityOptions densityOf(const CloudOptions& options) {
+  return {.voxelSize = options.voxelSize,
+          .edgeThickness = options.edgeThickness,
+          .edgeExponent = options.edgeExponent,
+          .factor = options.densityFactor};
+}
+
+}  // namespace
+
+float cloudEdgeReach(float edgeThickness, float voxelSize) {
+  // What layers are good for in any case, and no less.
+  constexpr float kLeastVoxels = 2.25f;
+  require(voxelSize > 0 && std::isfinite(edgeThickness),
+          fmt::format("cloudEdgeReach: expected voxels > 0 and a finite edge, got {} and {}", voxelSize,
+                      edgeThickness));
+  float reach = kLeastVoxels * voxelSize;
+  while (reach < edgeThickness / 2) reach *= 2;
+  return reach;
+}
+
+Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+  GriddedCumulo cumulo = layersOn(mesh, options, progress);
+  Cloud cloud{cloudDensity(cumulo, densityOf(options), progress), {}, std::move(cumulo.layers)};
   if (options.withSurface) cloud.surface = cloudSurface(cumulo, options.voxelSize, progress);
+  return cloud;
+}
+
+CloudLevels makeCloudLevels(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+  const GriddedCumulo cumulo = layersOn(mesh, options, progress);
+  const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);
+  return cloudLevels(cumulo, options.voxelSize, std::max(edge, kCloudSurfaceVoxels * options.voxelSize),
+                     progress);
+}
+
+Cloud makeCloud(const CloudLevels& levels, const CloudOptions& options, const Progress& progress) {
+  Cloud cloud{cloudDensity(levels, densityOf(options), progress), {}, levels.layers};
+  if (options.withSurface) cloud.surface = cloudSurface(levels, progress);
   return cloud;
 }
 

@@ -41,6 +41,17 @@ struct Cloud {
 /// needs, layers, density. @throws Error for options outside their range; Cancelled.
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress = silent());
 
+/// The same in two steps: `makeCloud(makeCloudLevels(mesh, options), other)` is `makeCloud(mesh, other)`, bit
+/// for bit, for other edges, exponents, factors and surfaces, as long as `cloudEdgeReach` of the edges is the
+/// same.
+CloudLevels makeCloudLevels(const Mesh& mesh, const CloudOptions& options,
+                            const Progress& progress = silent());
+Cloud makeCloud(const CloudLevels& levels, const CloudOptions& options, const Progress& progress = silent());
+
+/// How far from the surface layers are made for an edge that is nowhere thicker than this: 2.25 voxels, or
+/// twice that as often as it takes. @throws Error unless voxelSize > 0 and edgeThickness is finite.
+float cloudEdgeReach(float edgeThickness, float voxelSize);
+
 /// Memory that a program needs for `makeCloud`, bytes, from the area of the mesh: -10 to +50 % of what was
 /// measured. @throws Error if there is no layer.
 double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options);

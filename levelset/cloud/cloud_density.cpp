@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "nephele/levelset/cloud/detail/level_blocks.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
@@ -23,66 +24,17 @@ namespace nephele {
 
 namespace {
 
+using detail::addBrick;
+using detail::DensityRule;
+using detail::LevelSetRule;
+using detail::moveBlocks;
+using Block = detail::LevelBlock;
+
 constexpr int kBrick = kBrickSide;
 constexpr std::size_t kCount = kBrickSamples;
 constexpr int kBlock = 32;
-constexpr int kLevelSetHalfWidth = 3;
-
-/// What values of l become in the grid.
-class DensityRule {
- public:
-  DensityRule(const ScalarField& edge, std::optional<float> exponent) : edge_(edge), exponent_(exponent) {}
-  /// Values of l in `box` at and beyond whose ends the grid's values do not change.
-  Interval band(const Box& box) const {
-    const float edge = edge_.range(box).max;
-    return {-edge / 2, edge / 2};
-  }
-  DensityRule restrictedTo(const Box& box) const { return {edge_.restrictedTo(box), exponent_}; }
-  void apply(const PointSpans& points, std::span<float> l) const {
-    std::array<float, kCount> edge;
-    edge_.eval(points, std::span<float>(edge));
-    for (std::size_t i = 0; i < l.size(); ++i) l[i] = value(l[i], edge[i]);
-  }
-  float background() const { return 0; }
-  float inside() const { return 1; }
-
- private:
-  float value(float l, float edge) const {
-    const float t = std::clamp(l / edge + 0.5f, 0.0f, 1.0f);
-    if (exponent_) return *exponent_ == 1 ? t : std::pow(t, *exponent_);
-    return t * t * (3 - 2 * t);
-  }
-
-  ScalarField edge_;
-  std::optional<float> exponent_;
-};
-
-class LevelSetRule {
- public:
-  explicit LevelSetRule(float halfWidth) : halfWidth_(halfWidth) {}
-  Interval band(const Box&) const { return {-halfWidth_, halfWidth_}; }
-  LevelSetRule restrictedTo(const Box&) const { return *this; }
-  void apply(const PointSpans&, std::span<float> l) const {
-    for (float& value : l) value = std::clamp(value, -halfWidth_, halfWidth_);
-  }
-  float background() const { return -halfWidth_; }
-  float inside() const { return halfWidth_; }
-
- private:
-  float halfWidth_;
-};
-
-/// What one block of the octree came to.
-struct Block {
-  struct Constant {
-    Vec3i brick;
-    float value;
-  };
-  std::vector<Vec3i> bricks;
-  /// Of all bricks, one after the other.
-  std::vector<float> samples;
-  std::vector<Constant> constants;
-};
+/// A level that is off by less than this share of the estimated error was not misjudged, with any rounding.
+constexpr float kNearlyAll = 0.98f;
 
 template <class Rule>
 class GridBuilder {
@@ -94,7 +46,13 @@ class GridBuilder {
         factor_(factor),
         box_(cloud.box.expanded(rule.band(Box::everywhere()).max)) {}
 
-  VoxelGrid<float> build(const std::string& maker, const Progress& progress) const {
+  /// What the next grid misjudges is kept.
+  const std::vector<Block::Misjudged>& keepMisjudged() {
+    keepsMisjudged_ = true;
+    return misjudged_;
+  }
+
+  VoxelGrid<float> build(const std::string& maker, const Progress& progress) {
     const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
     const Vec3f low = box_.min, high = box_.max;
     const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
@@ -119,8 +77,7 @@ class GridBuilder {
   }
 
   /// Adds the blocks from `corner` on.
-  void addStrip(const Vec3i& corner, const Vec3i& count, VoxelGrid<float>& grid,
-                const Progress& progress) const {
+  void addStrip(const Vec3i& corner, const Vec3i& count, VoxelGrid<float>& grid, const Progress& progress) {
     const ScalarField estimate = sampledEstimate(corner, count);
     std::vector<Block> blocks(std::size_t(count.x) * std::size_t(count.y));
     parallelFor(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -131,7 +88,9 @@ class GridBuilder {
         split(block, kBlock, {estimate, factor_.restrictedTo(box), rule_.restrictedTo(box)}, blocks[b]);
       }
     });
-    move(blocks, grid);
+    moveBlocks(blocks, grid);
+    for (const Block& block : blocks)
+      for (const Block::Misjudged& m : block.misjudged) misjudged_.push_back(m);
   }
 
   Box boxOfVoxels(const Vec3i& first, const Vec3i& count) const {
@@ -212,42 +171,15 @@ class GridBuilder {
     if (count > 0) {
       const auto part = [&](std::array<float, kCount>& a) { return std::span<float>(a).first(count); };
       cloud_.surface.eval({part(nearX), part(nearY), part(nearZ)}, part(exact));
-      for (std::size_t i = 0; i < count; ++i) l[place[i]] = exact[i];
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t p = place[i];
+        if (keepsMisjudged_ && !(std::abs(l[p] - exact[i]) <= kNearlyAll * cloud_.estimateError))
+          block.misjudged.push_back({first + Vec3i{int(p & 7), int(p >> 3 & 7), int(p >> 6)}, l[p]});
+        l[p] = exact[i];
+      }
     }
 
-    bool inside = true, outside = true;
-    for (const float value : l) {
-      inside &= value >= known.band.max;
-      outside &= value <= known.band.min;
-    }
-    if (inside && known.factor.isPoint())
-      block.constants.push_back({brickOf(first), rule_.inside() * known.factor.min});
-    if ((inside && known.factor.isPoint()) || outside) return;
-    source.rule.apply({x, y, z}, std::span<float>(l));
-    std::array<float, kCount> factor;
-    if (known.factor.isPoint())
-      factor.fill(known.factor.min);
-    else
-      source.factor.eval({x, y, z}, std::span<float>(factor));
-    block.bricks.push_back(brickOf(first));
-    for (std::size_t i = 0; i < kCount; ++i) block.samples.push_back(l[i] * factor[i]);
-  }
-
-  /// Puts what `blocks` hold into `grid`.
-  void move(const std::vector<Block>& blocks, VoxelGrid<float>& grid) const {
-    std::vector<float*> targets;
-    std::vector<std::size_t> starts;
-    for (const Block& block : blocks) {
-      for (const Block::Constant& constant : block.constants)
-        grid.setConstant(constant.brick, constant.value);
-      starts.push_back(targets.size());
-      for (const Vec3i& brick : block.bricks) targets.push_back(grid.add(brick));
-    }
-    parallelFor(blocks.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t b = begin; b < end; ++b)
-        for (std::size_t i = 0; i < blocks[b].bricks.size(); ++i)
-          std::copy_n(blocks[b].samples.data() + i * kCount, kCount, targets[starts[b] + i]);
-    });
+    addBrick(source.rule, brickOf(first), {x, y, z}, l, known.band, {source.factor, known.factor}, block);
   }
 
   const GriddedCumulo& cloud_;
@@ -256,12 +188,15 @@ class GridBuilder {
   ScalarField factor_;
   /// Where the edge can be.
   Box box_;
+  bool keepsMisjudged_ = false;
+  std::vector<Block::Misjudged> misjudged_;
 };
 
 }  // namespace
 
-VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
-                              const Progress& progress) {
+namespace detail {
+
+void requireDensity(const CloudDensityOptions& options, const Box& box) {
   require(options.voxelSize > 0,
           "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   const Interval edge = options.edgeThickness.range(Box::everywhere());
@@ -270,9 +205,16 @@ VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOpti
               std::to_string(edge.min > 0 ? edge.max : edge.min));
   require(!options.edgeExponent || (*options.edgeExponent > 0 && std::isfinite(*options.edgeExponent)),
           "cloudDensity: edgeExponent must be > 0, got " + std::to_string(options.edgeExponent.value_or(0)));
-  const Interval factor = options.factor.range(cloud.box);
+  const Interval factor = options.factor.range(box);
   require(factor.min >= 0,
           "cloudDensity: the factor must not be negative, got values from " + std::to_string(factor.min));
+}
+
+}  // namespace detail
+
+VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOptions& options,
+                              const Progress& progress) {
+  detail::requireDensity(options, cloud.box);
   progress.begin("density");
   detail::releaseFreed();
   const DensityRule rule(options.edgeThickness, options.edgeExponent);
@@ -283,8 +225,36 @@ VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize, const
   require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
   progress.begin("surface");
   detail::releaseFreed();
-  return GridBuilder(cloud, voxelSize, LevelSetRule(kLevelSetHalfWidth * voxelSize), 1.0f)
+  return GridBuilder(cloud, voxelSize, LevelSetRule(kCloudSurfaceVoxels * voxelSize), 1.0f)
       .build("surface", progress);
+}
+
+CloudLevels cloudLevels(const GriddedCumulo& cloud, float voxelSize, float halfWidth,
+                        const Progress& progress) {
+  require(voxelSize > 0 && halfWidth > 0, "cloudLevels: voxelSize and halfWidth must be > 0, got " +
+                                              std::to_string(voxelSize) + " and " +
+                                              std::to_string(halfWidth));
+  progress.begin("levels");
+  detail::releaseFreed();
+  GridBuilder builder(cloud, voxelSize, LevelSetRule(halfWidth), 1.0f);
+  const std::vector<Block::Misjudged>& misjudged = builder.keepMisjudged();
+  CloudLevels result{builder.build("levels", progress),
+                     VoxelGrid<float>("estimates", double(voxelSize), 0.0f)};
+  for (const Block::Misjudged& m : misjudged) {
+    const Vec3i brick = brickOf(m.voxel);
+    std::int32_t entry = result.estimates.entryAt(brick);
+    if (entry < 0) {
+      std::fill_n(result.estimates.add(brick), kCount, 0.0f);
+      entry = result.estimates.entryAt(brick);
+    }
+    const Vec3i in{insideBrick(m.voxel.x), insideBrick(m.voxel.y), insideBrick(m.voxel.z)};
+    result.estimates.samples(entry)[(in.z * kBrick + in.y) * kBrick + in.x] = m.estimate;
+  }
+  result.halfWidth = halfWidth;
+  result.estimateError = cloud.estimateError;
+  result.box = cloud.box;
+  result.layers = cloud.layers;
+  return result;
 }
 
 }  // namespace nephele
