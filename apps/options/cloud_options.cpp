@@ -8,6 +8,14 @@
 #include "nephele/modeling/field/operations.h"
 
 namespace nephele::apps {
+namespace {
+
+void addMaskFiles(const FieldValue& value, std::vector<std::string>& files) {
+  if (value.source == FieldValue::Source::mask) files.push_back(value.path);
+  for (const FieldValue& factor : value.factors) addMaskFiles(factor, files);
+}
+
+}  // namespace
 
 double CloudArguments::voxel(double longestSide) const {
   return voxelSize.value > 0 ? voxelSize.worldUnits(longestSide) : longestSide / resolution;
@@ -73,15 +81,12 @@ Extent CloudArguments::extent(Run& run) const {
 
 std::vector<std::string> CloudArguments::maskFiles() const {
   std::vector<std::string> files;
-  const auto add = [&](const FieldValue& value) {
-    if (value.source == FieldValue::Source::mask) files.push_back(value.path);
-  };
   for (const FieldValue* value : {&amplitude, &frequency, &lacunarity, &roughness, &billow, &billowScale})
-    add(*value);
+    addMaskFiles(*value, files);
   for (const LayerRecipe& layer : recipe)
     for (const auto* value :
          {&layer.amplitude, &layer.frequency, &layer.billow, &layer.billowScale, &layer.mask})
-      if (*value) add(**value);
+      if (*value) addMaskFiles(**value, files);
   return files;
 }
 

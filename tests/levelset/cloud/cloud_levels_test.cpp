@@ -27,7 +27,8 @@ Bricks bricksOf(const VoxelGrid<float>& grid) {
   grid.forEachBrick([&](const Vec3i& brick, std::int32_t entry) {
     std::vector<float> values(kBrickSamples, entry < 0 ? grid.constants()[std::size_t(-1 - entry)] : 0.0f);
     if (entry >= 0) values.assign(grid.samples(entry), grid.samples(entry) + kBrickSamples);
-    if (entry != -1) result[{brick.z, brick.y, brick.x}] = std::move(values);
+    if (std::ranges::any_of(values, [&](float value) { return value != grid.background(); }))
+      result[{brick.z, brick.y, brick.x}] = std::move(values);
   });
   return result;
 }
@@ -52,19 +53,20 @@ TEST(CloudLevels, GiveTheSameDensitiesBitForBit) {
       options.edgeExponent = exponent;
       options.withSurface = true;
       // Constant in some bricks, not in others, and nowhere below.
-      options.densityFactor = densityFactor({.low = -0.5f,
-                                             .high = 0.5f,
-                                             .interiorNoise = exponent ? 0.5f : 0.0f,
-                                             .flatBase = DensityProfile::FlatBase{.height = -0.2f, .softness = 0.05f}});
+      options.densityFactor =
+          densityFactor({.low = -0.5f,
+                         .high = 0.5f,
+                         .interiorNoise = exponent ? 0.5f : 0.0f,
+                         .flatBase = DensityProfile::FlatBase{.height = -0.2f, .softness = 0.05f}});
       const Cloud direct = makeCloud(mesh, options), again = makeCloud(levels, options);
-      EXPECT_EQ(bricksOf(direct.density), bricksOf(again.density)) << edge;
-      EXPECT_EQ(bricksOf(*direct.surface), bricksOf(*again.surface)) << edge;
+      EXPECT_TRUE(bricksOf(direct.density) == bricksOf(again.density)) << edge;
+      EXPECT_TRUE(bricksOf(*direct.surface) == bricksOf(*again.surface)) << edge;
       EXPECT_GT(bricksOf(again.density).size(), 50u);
       EXPECT_EQ(direct.layers.size(), again.layers.size());
     }
   CloudOptions varying = optionsOf(0.1f);
   varying.edgeThickness = clamp(plane({}, {0, 1, 0}) * 0.1f + 0.05f, 0.01f, 0.1f);
-  EXPECT_EQ(bricksOf(makeCloud(mesh, varying).density), bricksOf(makeCloud(levels, varying).density));
+  EXPECT_TRUE(bricksOf(makeCloud(mesh, varying).density) == bricksOf(makeCloud(levels, varying).density));
 }
 
 // The estimate says that the ball is far larger in one place than it is; thin edges believe it.
@@ -79,7 +81,7 @@ TEST(CloudLevels, KeepWhereTheEstimateIsMisjudged) {
   EXPECT_GT(levels.estimates.sampledBricks(), 0u);
   for (const float edge : {0.02f, 0.1f, 0.3f}) {
     const CloudDensityOptions options{.voxelSize = kVoxel, .edgeThickness = edge};
-    EXPECT_EQ(bricksOf(cloudDensity(cumulo, options)), bricksOf(cloudDensity(levels, options))) << edge;
+    EXPECT_TRUE(bricksOf(cloudDensity(cumulo, options)) == bricksOf(cloudDensity(levels, options))) << edge;
   }
 }
 
@@ -116,8 +118,8 @@ TEST_F(LevelCacheFiles, HoldWhatWasKept) {
   ASSERT_TRUE(cache().write(key_, levels));
   const auto read = cache().read(key_);
   ASSERT_TRUE(read);
-  EXPECT_EQ(bricksOf(read->levels), bricksOf(levels.levels));
-  EXPECT_EQ(bricksOf(read->estimates), bricksOf(levels.estimates));
+  EXPECT_TRUE(bricksOf(read->levels) == bricksOf(levels.levels));
+  EXPECT_TRUE(bricksOf(read->estimates) == bricksOf(levels.estimates));
   EXPECT_EQ(read->halfWidth, levels.halfWidth);
   EXPECT_EQ(read->estimateError, levels.estimateError);
   EXPECT_EQ(read->box, levels.box);
@@ -193,7 +195,7 @@ TEST_F(LevelCacheFiles, MayBeWrittenAndReadAtOnce) {
         EXPECT_TRUE(cache().write(key_, levels, notes));
         const auto read = cache().read(key_, notes);
         ASSERT_TRUE(read);
-        EXPECT_EQ(bricksOf(read->levels), expected);
+        EXPECT_TRUE(bricksOf(read->levels) == expected);
         EXPECT_TRUE(notes.all.empty());
       }
     });
