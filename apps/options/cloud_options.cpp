@@ -72,10 +72,10 @@ CloudOptions CloudArguments::resolved(FieldSources& sources, const Run& run) con
 }
 
 Extent CloudArguments::extent(Run& run) const {
-  if (!shape.isGenerated()) return extentOfFile(shape.input);
+  if (shape.inputs.size() == 1) return extentOfFile(shape.inputs[0]);
   ShapeArguments only = shape;
   only.meshOutput.clear();
-  const Box box = boundingBox(only.shape(run));
+  const Box box = boundingBox(shapeOf(only, run));
   return {box, double(box.longestSide())};
 }
 

@@ -39,6 +39,10 @@ struct CloudArguments {
   CloudOptions cloud;
   bool halfFloat = false;
 
+  /// What the cloud grows on; its mesh is written where that is asked for. @throws as ShapeArguments::shape.
+  Mesh shapeOf(const ShapeArguments& from, Run& run) const {
+    return from.shape([this](double longestSide) { return voxel(longestSide); }, run);
+  }
   /// World units, for a shape with this longest side.
   double voxel(double longestSide) const;
   /// As typed, else those of the recipe, else the default.

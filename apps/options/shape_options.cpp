@@ -4,19 +4,27 @@
 
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
 
 namespace nephele::apps {
 
-Mesh ShapeArguments::shape(Run& run) const {
-  if (input.empty() && !species)
+Mesh ShapeArguments::shape(const std::function<double(double)>& voxelSize, Run& run) const {
+  combine.refuseFor(inputs.size());
+  if (inputs.empty() && !species)
     throw CLI::ValidationError("input", "give a mesh or a level set to grow a cloud on, or --species");
   Mesh mesh;
   if (species) {
     run.begin("shape");
     mesh = cloudShapeMesh({.species = *species, .seed = std::uint32_t(seed), .size = float(size)}, run);
+  } else if (inputs.size() > 1) {
+    const Solids solids(inputs, repair, subdivide, run);
+    const double longestSide = run.longestSide(solids.box());
+    const VoxelGrid<float> level =
+        solids.combined(combine, {.voxelSize = voxelSize(longestSide)}, longestSide, run);
+    mesh = marchingCubes(*toBricks(level), 0.0f, run);
   } else {
     run.begin("read");
-    RepairedMesh read = readShape(input, repair, run);
+    RepairedMesh read = readShape(inputs[0], repair, run);
     for (const std::string& note : read.repairs) run.note(note);
     mesh = subdividedAsAsked(std::move(read.mesh), subdivide, run);
   }
@@ -28,8 +36,10 @@ Mesh ShapeArguments::shape(Run& run) const {
 }
 
 void addShapeOptions(CLI::App& app, ShapeArguments& a) {
-  auto* input = app.add_option("input", a.input, "Mesh, or level set (.vdb, .nvdb), to grow a cloud on.")
-                    ->type_name("FILE");
+  auto* input =
+      app.add_option("input", a.inputs,
+                     "Mesh, or level set (.vdb, .nvdb), to grow a cloud on; or several, see --combine.")
+          ->type_name("FILE");
   std::vector<std::pair<std::string, std::optional<CloudSpecies>>> choices;
   for (const CloudSpecies species : cloudSpecies())
     choices.emplace_back(std::string(speciesName(species)), species);
@@ -43,6 +53,7 @@ void addShapeOptions(CLI::App& app, ShapeArguments& a) {
       ->needs(species);
   addOutput(app, "--shape-mesh", a.meshOutput, {".obj", ".ply", ".stl"},
             "Also write what the cloud grows on, before any layer.");
+  addCombineOptions(app, a.combine);
   addRepair(app, a.repair.mode);
   addSubdivide(app, a.subdivide)->excludes(species);
 }

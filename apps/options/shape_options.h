@@ -1,16 +1,22 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/app.h"
+#include "apps/options/combine_options.h"
 #include "nephele/levelset/cloud/cloud.h"
 
 namespace nephele::apps {
 
 /// What a cloud grows on, as typed: a file, or a shape from a seed.
 struct ShapeArguments {
-  std::string input, meshOutput;
+  std::vector<std::string> inputs;
+  std::string meshOutput;
+  /// What several inputs become.
+  CombineArguments combine;
   std::optional<CloudSpecies> species;
   int seed = 0;
   double size = 1;
@@ -19,9 +25,12 @@ struct ShapeArguments {
 
   bool isGenerated() const { return species.has_value(); }
 
-  /// The shape; where asked for, its mesh is written, too. @throws CLI::ValidationError where neither a file
-  /// nor a species was given.
-  Mesh shape(Run& run) const;
+  /// What messages call the shape.
+  std::string name() const { return inputs.empty() ? "" : inputs.front(); }
+  /// The shape; where asked for, its mesh is written, too. Several inputs are combined on voxels of the size
+  /// that `voxelSize` says for a longest side. @throws CLI::ValidationError where neither a file nor a
+  /// species was given.
+  Mesh shape(const std::function<double(double)>& voxelSize, Run& run) const;
 };
 
 /// Declares the options on `app`.

@@ -54,7 +54,7 @@ nlohmann::json layersOf(const Cloud& cloud, const CloudOptions& options, const C
 
 void growCloud(const CloudArguments& arguments, Run& run) {
   run.expect(0, 0.02);
-  const Mesh shape = arguments.shape.shape(run);
+  const Mesh shape = arguments.shapeOf(arguments.shape, run);
   FieldSources sources = arguments.sources(shape, run);
   const CloudOptions options = arguments.resolved(sources, run);
   tellLayers(arguments, options, sources.box(), run);
@@ -62,7 +62,7 @@ void growCloud(const CloudArguments& arguments, Run& run) {
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
   // Distance, layers, density and perhaps the surface.
   run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
-  Cloud cloud = namingFile(arguments.shape.input,
+  Cloud cloud = namingFile(arguments.shape.name(),
                            [&] { return arguments.cache.grown(shape, arguments, options, run); });
   run.expect(0.9, 1, 2);
   const auto fileOf = [&](VoxelGrid<float>& grid, const char* name, VdbGridInfo::Class gridClass) {

@@ -1,98 +1,81 @@
 #include <fmt/format.h>
 
-#include "apps/app.h"
+#include "apps/options/levelset_options.h"
 #include "apps/options/mesh_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
-#include "nephele/levelset/mesh/mesh_repair.h"
-#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
 
-struct LevelsetOptions {
-  std::string input;
-  std::string output;
-  Length voxelSize;
-  int resolution = 256;
-  MeshToLevelSetOptions conversion;
-  MeshRepairOptions repair;
-  int subdivide = 0;
-  const CLI::Option* voxelSizeOption = nullptr;
+struct Converted {
+  VoxelGrid<float> level;
+  double voxelSize;
+  /// Of the mesh, where there is one.
+  std::optional<double> volume{};
 };
 
-void bindOptions(CLI::App& app, LevelsetOptions& options) {
-  app.add_option("input", options.input, "Mesh to convert (.obj, .ply, .stl, .off, .gltf, .glb).")
-      ->required()
-      ->type_name("FILE");
-  addOutput(app, "-o,--output", options.output, {".vdb"}, "Volume to write; its grid is called 'surface'.")
-      ->required();
-  auto* resolution = addCount(app, "--resolution", options.resolution, 1, 1000000,
-                              "Voxels along the longest side of the mesh.");
-  options.voxelSizeOption = addLength(app, "--voxel-size", options.voxelSize,
-                                      "Edge of a voxel, instead of --resolution.", Sign::positive)
-                                ->excludes(resolution);
-  addNumber(app, "--half-width", options.conversion.halfWidthVoxels, 1, 1000,
-            "Voxels on either side of the surface that hold distances.");
-  addPercent(app, "--max-volume-error", options.conversion.mostVolumeError, 1e-6, 100,
-             "Fail where the volume differs from that of the mesh by this share; from 1 % on it is said.");
-  addRepair(app, options.repair.mode);
-  addSubdivide(app, options.subdivide);
-}
-
-double voxelSizeOf(const LevelsetOptions& options, double longestSide) {
-  return options.voxelSizeOption->count() > 0 ? options.voxelSize.worldUnits(longestSide)
-                                              : longestSide / options.resolution;
-}
-
-void convert(const LevelsetOptions& options, Run& run) {
+Converted convertMesh(const LevelsetArguments& options, Run& run) {
+  const std::string& input = options.inputs[0];
   run.begin("read");
-  const Mesh soup = readMesh(options.input);
+  const Mesh soup = readMesh(input);
   run.begin("repair");
   MeshRepairOptions repair = options.repair;
-  repair.voxelSize = voxelSizeOf(options, run.longestSide(boundingBox(soup)));
-  RepairedMesh repaired = namingFile(options.input, [&] { return repairMesh(soup, repair, run); });
+  repair.voxelSize = options.voxelSize(run.longestSide(boundingBox(soup)));
+  RepairedMesh repaired = namingFile(input, [&] { return repairMesh(soup, repair, run); });
   for (const std::string& what : repaired.repairs) run.note(what);
   if (options.subdivide > 0) {
     repaired.mesh = namingFile(
-        options.input, [&] { return subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run); });
+        input, [&] { return subdividedAsAsked(std::move(repaired.mesh), options.subdivide, run); });
     repaired.after = diagnose(repaired.mesh);
   }
-
+  const MeshDiagnosis& is = repaired.after;
   MeshToLevelSetOptions conversion = options.conversion;
-  conversion.voxelSize = voxelSizeOf(options, run.longestSide(repaired.after.box));
+  conversion.voxelSize = options.voxelSize(run.longestSide(is.box));
   run.requireMemory(
       estimateLevelSetBytes(repaired.mesh, conversion),
       "use larger voxels (a lower --resolution or a larger --voxel-size) or a smaller --half-width");
-  VoxelGrid<float> level =
-      namingFile(options.input, [&] { return meshToLevelSet(repaired.mesh, conversion, run); });
-  const double volume = enclosedVolume(level);
+  run.stats["mesh"] = {
+      {"vertices", is.vertices}, {"triangles", is.triangles}, {"closed", is.closed()}, {"volume", is.volume}};
+  run.stats["repairs"] = repaired.repairs;
+  return {namingFile(input, [&] { return meshToLevelSet(repaired.mesh, conversion, run); }),
+          conversion.voxelSize, is.volume};
+}
+
+Converted combine(const LevelsetArguments& options, Run& run) {
+  const Solids solids(options.inputs, options.repair, options.subdivide, run);
+  const double longestSide = run.longestSide(solids.box());
+  MeshToLevelSetOptions conversion = options.conversion;
+  conversion.voxelSize = options.voxelSize(longestSide, solids.ownVoxelSize());
+  run.stats["inputs"] = solids.description();
+  return {solids.combined(options.combine, conversion, longestSide, run), conversion.voxelSize};
+}
+
+void convert(const LevelsetArguments& options, Run& run) {
+  options.combine.refuseFor(options.inputs.size());
+  Converted converted = options.isMesh() ? convertMesh(options, run) : combine(options, run);
+  const double volume = enclosedVolume(converted.level);
 
   run.begin("write");
-  const VdbGrid grid = toVdb(std::move(level), {"surface", VdbGridInfo::Class::levelSet});
+  const VdbGrid grid = toVdb(std::move(converted.level), {"surface", VdbGridInfo::Class::levelSet});
   writeVdbFile(options.output, {grid}, run.metadata());
 
   run.begin("describe");
   const VdbGridInfo info = describe(grid);
-  run.stats["mesh"] = {{"vertices", repaired.after.vertices},
-                       {"triangles", repaired.after.triangles},
-                       {"closed", repaired.after.closed()},
-                       {"volume", repaired.after.volume}};
-  run.stats["repairs"] = repaired.repairs;
   run.stats["grid"] = {
-      {"voxel_size", conversion.voxelSize}, {"active_voxels", info.activeVoxels}, {"volume", volume}};
-  run.result(fmt::format("{}: grid '{}', voxel size {:g}, {} active voxels, volume {:g} (mesh {:g})",
-                         options.output, info.name, conversion.voxelSize, info.activeVoxels, volume,
-                         repaired.after.volume));
+      {"voxel_size", converted.voxelSize}, {"active_voxels", info.activeVoxels}, {"volume", volume}};
+  run.result(fmt::format("{}: grid '{}', voxel size {:g}, {} active voxels, volume {:g}{}", options.output,
+                         info.name, converted.voxelSize, info.activeVoxels, volume,
+                         converted.volume ? fmt::format(" (mesh {:g})", *converted.volume) : ""));
 }
 
 }  // namespace
 
 Verb levelsetVerb() {
-  return verbOf("levelset", "Turns a closed mesh into a signed distance volume.",
-                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", bindOptions, convert, {},
-                [](const LevelsetOptions& options, Run&) { return extentOfFile(options.input); });
+  return verbOf("levelset", "Turns closed meshes into a signed distance volume, and combines several.",
+                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", addLevelsetOptions, convert, {},
+                [](const LevelsetArguments& options, Run&) { return options.extent(); });
 }
 
 }  // namespace nephele::apps

@@ -67,27 +67,6 @@ std::string digestOf(const CloudLevels& levels) {
   return fmt::format("{:016x}{:016x}", digestOf(levels.levels), digestOf(levels.estimates));
 }
 
-VoxelGrid<float> voxelsOf(const BrickGrid& bricks, const std::string& maker) {
-  VoxelGrid<float> grid(maker, double(bricks.voxelSize()), bricks.background());
-  const Vec3i first = bricks.firstBrick(), count = bricks.brickCount();
-  for (int z = 0; z < count.z; ++z)
-    for (int y = 0; y < count.y; ++y)
-      for (int x = 0; x < count.x; ++x) {
-        const Vec3i brick = first + Vec3i{x, y, z};
-        const std::int32_t pool = bricks.poolIndex(brick);
-        if (pool == 0) continue;
-        if (const Interval range = bricks.ranges()[std::size_t(pool)]; range.isPoint()) {
-          grid.setConstant(brick, range.min);
-          continue;
-        }
-        const float* from = bricks.brick(pool);
-        float* to = grid.add(brick);
-        for (int k = 0; k < kBrickSide; ++k)
-          for (int j = 0; j < kBrickSide; ++j) to = std::copy_n(from + sampleOffset(0, j, k), kBrickSide, to);
-      }
-  return grid;
-}
-
 /// What a file takes is given back to nobody.
 VoxelGrid<float> copyOf(const VoxelGrid<float>& grid) {
   VoxelGrid<float> copy("levels", grid.voxelSize(), grid.background());
@@ -126,8 +105,8 @@ CloudLevels levelsFrom(const std::string& path, const std::string& key) {
   const json label = json::parse(metadataOf(*surface, kLabel).value_or("{}"));
   require(label.value("key", "") == key, "it holds something else");
   const double voxelSize = label.at("voxel_size");
-  CloudLevels levels{voxelsOf(*toBricks(*surface), "levels"), VoxelGrid<float>("estimates", voxelSize, 0.0f)};
-  if (estimate != grids.end()) levels.estimates = voxelsOf(*toBricks(*estimate), "estimates");
+  CloudLevels levels{toVoxels(*toBricks(*surface)), VoxelGrid<float>("estimates", voxelSize, 0.0f)};
+  if (estimate != grids.end()) levels.estimates = toVoxels(*toBricks(*estimate));
   levels.halfWidth = label.at("half_width");
   levels.estimateError = label.at("estimate_error");
   const auto box = label.at("box").get<std::array<float, 6>>();

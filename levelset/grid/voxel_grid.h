@@ -101,4 +101,7 @@ enum class Beside {
 /// @throws Error if the box of its bricks is too large to hold.
 std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside = Beside::varying);
 
+/// The voxels of bricks: the way back.
+VoxelGrid<float> toVoxels(const BrickGrid& bricks);
+
 }  // namespace nephele

@@ -81,7 +81,10 @@ void runVerbs(const Input& input) {
               path);
       break;
     case 4:
-      runVerb({"cloud", path, "-o", volume, "--resolution", "10", "--layers", "1"}, path);
+      if (input.hash / 10 % 2 == 0)
+        runVerb({"cloud", path, "-o", volume, "--resolution", "10", "--layers", "1"}, path);
+      else
+        runVerb({"levelset", ballLevelSet(), path, "-o", volume, "--voxel-size", "0.1"}, path);
       break;
     case 5:
       runVerb({"advect", path, "-o", volume, "--velocity", "curl:amplitude=2%"}, path);

@@ -189,4 +189,30 @@ std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside)
   return detail::gatherBricks(blocks, grid.lattice(), beside, "'grid'");
 }
 
+VoxelGrid<float> toVoxels(const BrickGrid& bricks) {
+  VoxelGrid<float> grid("grid", bricks.lattice(), bricks.background());
+  const Vec3i first = bricks.firstBrick(), count = bricks.brickCount();
+  for (int z = 0; z < count.z; ++z)
+    for (int y = 0; y < count.y; ++y)
+      for (int x = 0; x < count.x; ++x) {
+        const Vec3i brick = first + Vec3i{x, y, z};
+        const std::int32_t pool = bricks.poolIndex(brick);
+        if (pool == 0) continue;
+        if (const Interval range = bricks.ranges()[std::size_t(pool)]; range.isPoint()) {
+          grid.setConstant(brick, range.min);
+          continue;
+        }
+        const float* from = bricks.brick(pool);
+        std::array<float, kBrickSamples> own;
+        auto to = own.begin();
+        for (int k = 0; k < kBrickSide; ++k)
+          for (int j = 0; j < kBrickSide; ++j)
+            to = std::copy_n(from + sampleOffset(0, j, k), kBrickSide, to);
+        // Some bricks are there for their neighbours' borders.
+        if (std::ranges::any_of(own, [&](float value) { return value != bricks.background(); }))
+          std::ranges::copy(own, grid.add(brick));
+      }
+  return grid;
+}
+
 }  // namespace nephele
