@@ -4,7 +4,7 @@
 // T_before - T_after with T = exp(-optical depth so far), so that the weights of a ray add up to its opacity
 // exactly, whatever the steps are.
 //
-// Steps are gathered into blocks of 16 that run across bricks. Densities of a block are looked up as vectors:
+// Steps are gathered into blocks of 32 that run across bricks. Densities of a block are looked up as vectors:
 // brick table, then the eight corners. So is the light, in every sun's column densities and in the scattered
 // light, of those steps alone that add to the picture, once they fill a vector. Densities and columns are
 // CodedBricks, half as many bytes to wait for.

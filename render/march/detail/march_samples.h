@@ -294,28 +294,17 @@ HWY_INLINE Floats readCoded(const MarchScene::Bricks& bricks, const Places& plac
   return hn::Mul(above, joined(d, words[4]));
 }
 
-// Places in coded bricks of as many samples as a block has, at distances s along a ray. All are found before
-// the first value is read, so that the processor need not wait for one vector before it starts the next.
-template <int kSize>
-HWY_INLINE void locateBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
-                            const float* HWY_RESTRICT s, Places (&places)[kSize / kLanes]) {
-  for (int v = 0; v != kSize / kLanes; ++v)
+// Places in coded bricks of vectors of samples, at distances s along a ray. All are found before the first
+// value is read, so that the processor need not wait for one vector before it starts the next.
+HWY_INLINE void locateAll(const MarchScene::Bricks& bricks, const LatticeRay& ray, int vectors,
+                          const float* HWY_RESTRICT s, Places* HWY_RESTRICT places) {
+  for (int v = 0; v != vectors; ++v)
     locate<CodedBricks::kWidth>(bricks, pointAt(ray, hn::Load(Lanes(), s + v * kLanes)), places[v]);
 }
 
-template <int kSize>
-HWY_INLINE void readBlock(const MarchScene::Bricks& bricks, const Places (&places)[kSize / kLanes],
-                          float* HWY_RESTRICT values) {
-  for (int v = 0; v != kSize / kLanes; ++v)
-    hn::Store(readCoded(bricks, places[v]), Lanes(), values + v * kLanes);
-}
-
-template <int kSize>
-HWY_INLINE void sampleBlock(const MarchScene::Bricks& bricks, const LatticeRay& ray,
-                            const float* HWY_RESTRICT s, float* HWY_RESTRICT values) {
-  Places places[kSize / kLanes];
-  locateBlock<kSize>(bricks, ray, s, places);
-  readBlock<kSize>(bricks, places, values);
+HWY_INLINE void readAll(const MarchScene::Bricks& bricks, int vectors, const Places* HWY_RESTRICT places,
+                        float* HWY_RESTRICT values) {
+  for (int v = 0; v != vectors; ++v) hn::Store(readCoded(bricks, places[v]), Lanes(), values + v * kLanes);
 }
 
 // Three values at once, at p within bricks that are laid out as the density's.

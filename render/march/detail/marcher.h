@@ -22,8 +22,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
-// Few enough that a ray ends soon behind what hides the rest.
-constexpr int kBlock = 16;
+// Enough that the processor need not wait for one vector before it starts the next, and few enough that a ray
+// ends soon behind what hides the rest.
+constexpr int kBlock = 32;
 
 // One ray's march: collects steps, adds the opacity of a block of them at a time, and the light of a vector
 // of those that are seen. Three colours where MarchScene::isColoured, else one.
@@ -45,22 +46,21 @@ class Marcher {
   // is as good as opaque.
   bool take(float start, float ds, int count, float density) {
     const Lanes d;
-    const int lanes = int(hn::Lanes(d));
     float begin = start;
     start += ray_.jitter * ds;
     while (count > 0) {
-      if (density >= 0 && !someKnown_) {
-        std::fill_n(known_, count_, -1.0f);
-        someKnown_ = true;
-      }
-      // Whole vectors, whatever room there is: the blocks have as much again behind them.
-      for (int i = 0; i < std::min(count, kBlock); i += lanes) {
-        const Floats index = hn::Iota(d, float(i));
-        hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), d, s_ + count_ + i);
-        hn::StoreU(hn::Set(d, ds), d, ds_ + count_ + i);
-        if (needsBegin_)
-          hn::StoreU(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), d, begin_ + count_ + i);
-        if (someKnown_) hn::StoreU(hn::Set(d, density), d, known_ + count_ + i);
+      if (density >= 0 && !std::exchange(someKnown_, true)) std::fill_n(known_, kBlock, -1.0f);
+      // Whole vectors: the processor would wait long before it loads one that was stored in parts.
+      for (int i = count_ / kLanes * kLanes; i < std::min(count_ + count, kBlock); i += kLanes) {
+        const Floats index = hn::Iota(d, float(i - count_));
+        const auto isNew = hn::Ge(index, hn::Zero(d));
+        const auto put = [&](Floats values, float* block) HWY_ATTR {
+          hn::Store(hn::IfThenElse(isNew, values, hn::Load(d, block + i)), d, block + i);
+        };
+        put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), s_);
+        put(hn::Set(d, ds), ds_);
+        if (needsBegin_) put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), begin_);
+        if (someKnown_) put(hn::Set(d, density), known_);
       }
       const int taken = std::min(count, kBlock - count_);
       count_ += taken;
@@ -95,20 +95,26 @@ class Marcher {
   // Adds the steps collected. False once the ray is as good as opaque.
   bool flush() {
     const Lanes d;
-    const int used = count_;
-    for (int i = used; i < kBlock; ++i) s_[i] = s_[used - 1], ds_[i] = 0.0f, known_[i] = known_[used - 1];
+    // Of whole vectors.
+    const int used = count_, end = (used + kLanes - 1) / kLanes * kLanes;
+    if (used != end) repeatLast();
     count_ = 0;
     result_.samples += std::uint32_t(used);
 
     // Optical depths of the steps, and behind them.
     alignas(64) float own[kBlock], after[kBlock];
-    readDensities(own);
+    Places places[kBlock / kLanes];
+    const bool needsLookUp = !someKnown_ || someUnknown(end);
+    if (needsLookUp) locateAll(scene_.density, ray_.density, end / kLanes, s_, places);
+    readLight();
+    if (needsLookUp) readAll(scene_.density, end / kLanes, places, own);
+    if (std::exchange(someKnown_, false)) takeKnown(end, needsLookUp, own);
     Floats most = hn::Zero(d);
-    for (int i = 0; i != kBlock; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
+    for (int i = 0; i != end; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
     if (!scene_.emission.table && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
     const float before = depth_;
     Floats behind = hn::Set(d, depth_);
-    for (int i = 0; i != kBlock; i += kLanes) {
+    for (int i = 0; i != end; i += kLanes) {
       const Floats depth =
           hn::Mul(hn::Mul(hn::Load(d, own + i), hn::Set(d, scene_.extinction)), hn::Load(d, ds_ + i));
       const Floats sums = runningSum(depth, behind);
@@ -125,7 +131,7 @@ class Marcher {
     if (isHeld_) hold(before, after, used);
     if (record_) record(before, after, used);
 
-    for (int i = 0; i != kBlock; i += kLanes) {
+    for (int i = 0; i != end; i += kLanes) {
       LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
       weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
             steps);
@@ -139,18 +145,31 @@ class Marcher {
     return *std::max_element(through_, through_ + kColours) > scene_.cutoff;
   }
 
-  void readDensities(float* density) {
+  // Fills the last vector with steps of no length at the place of the last.
+  void repeatLast() {
     const Lanes d;
-    if (!std::exchange(someKnown_, false))
-      return sampleBlock<kBlock>(scene_.density, ray_.density, s_, density);
-    for (int i = 0; i != kBlock; i += kLanes) {
-      Floats known = hn::Load(d, known_ + i);
-      if (!hn::AllTrue(d, hn::Ge(known, hn::Zero(d)))) {
-        Places places;
-        locate<CodedBricks::kWidth>(scene_.density, pointAt(ray_.density, hn::Load(d, s_ + i)), places);
-        known = readCoded(scene_.density, places);
-      }
-      hn::Store(known, d, density + i);
+    const Floats s = hn::Set(d, s_[count_ - 1]), known = hn::Set(d, known_[count_ - 1]);
+    const int i = count_ / kLanes * kLanes;
+    const auto isUsed = hn::Lt(hn::Iota(d, float(i)), hn::Set(d, float(count_)));
+    hn::Store(hn::IfThenElse(isUsed, hn::Load(d, s_ + i), s), d, s_ + i);
+    hn::Store(hn::IfThenElseZero(isUsed, hn::Load(d, ds_ + i)), d, ds_ + i);
+    hn::Store(hn::IfThenElse(isUsed, hn::Load(d, known_ + i), known), d, known_ + i);
+  }
+
+  bool someUnknown(int end) const {
+    const Lanes d;
+    Floats least = hn::Load(d, known_);
+    for (int i = kLanes; i < end; i += kLanes) least = hn::Min(least, hn::Load(d, known_ + i));
+    return !hn::AllTrue(d, hn::Ge(least, hn::Zero(d)));
+  }
+
+  // Densities that are known in place of those looked up, if any were.
+  void takeKnown(int end, bool wereLookedUp, float* density) {
+    const Lanes d;
+    for (int i = 0; i != end; i += kLanes) {
+      const Floats known = hn::Load(d, known_ + i);
+      const Floats other = wereLookedUp ? hn::Load(d, density + i) : known;
+      hn::Store(hn::IfThenElse(hn::Ge(known, hn::Zero(d)), known, other), d, density + i);
     }
   }
 
@@ -180,6 +199,7 @@ class Marcher {
   // The result so far, with the light that is waited for: what is added to it later stays as without a
   // record.
   void mark() {
+    readLight();
     const MarchResult before = result_;
     const LitSteps<kColours> waiting = lit_;
     Floats sums[kMostSums];
@@ -260,15 +280,28 @@ class Marcher {
   // Of all that wait for it.
   void lightAll() {
     if (!lit_.empty()) light(lit_.take());
+    readLight();
   }
 
-  // Adds the light that steps send to the eye.
+  // Finds where the light of steps is. It is read when the next densities have been found: the processor does
+  // not look far enough ahead to read one while it looks for the other.
   void light(const LitPart<kColours>& steps) {
+    readLight();
+    located_ = steps;
+    isLocated_ = true;
+    for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun)
+      locate<CodedBricks::kWidth>(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun]);
+    if (!scene_.scattered.empty())
+      locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells_);
+  }
+
+  // Adds the light that located steps send to the eye.
+  void readLight() {
+    if (!std::exchange(isLocated_, false)) return;
     const Lanes d;
+    const LitPart<kColours>& steps = located_;
     for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-      Places places;
-      locate<CodedBricks::kWidth>(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places);
-      const Floats column = readCoded(scene_.suns[sun], places);
+      const Floats column = readCoded(scene_.suns[sun], places_[sun]);
       // Of every colour of the result, and one where a weight is all colours'.
       const int colours = kColours == 1 ? scene_.colours : kColours;
       Floats sums[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
@@ -290,17 +323,15 @@ class Marcher {
     }
     for (std::size_t n = 0; n != scene_.locals.size(); ++n)
       addLocal(scene_, ray_, n, jitter_, steps.s, steps.length, steps.weight, result_);
-    if (!scene_.scattered.empty()) scattered(steps);
+    scattered(steps);
   }
 
   // The part of it that the lattices hold.
   void scattered(const LitPart<kColours>& steps) {
-    Cells cells;
-    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells);
     Floats* sum = sums_ + 3 * scene_.suns.size();
     for (const MarchScene::Scattered& lattice : scene_.scattered) {
       Floats two[2];
-      readTwo(lattice.nodes, cells, two);
+      readTwo(lattice.nodes, cells_, two);
       for (int n = 0; n != 2; ++n, ++sum)
         *sum = hn::MulAdd(two[n], steps.weight[kColours == 1 ? 0 : lattice.kinds[n].part], *sum);
     }
@@ -335,16 +366,21 @@ class Marcher {
   // Where in its step a sample is, about.
   float jitter_ = ray_.jitter;
   alignas(64) float seen_[kBlock];
-  alignas(64) float s_[2 * kBlock];
-  alignas(64) float ds_[2 * kBlock];
-  alignas(64) float begin_[2 * kBlock];
+  alignas(64) float s_[kBlock] = {};
+  alignas(64) float ds_[kBlock] = {};
+  alignas(64) float begin_[kBlock] = {};
   // Densities, negative where they have to be looked up.
-  alignas(64) float known_[2 * kBlock];
+  alignas(64) float known_[kBlock] = {};
   int count_ = 0;
   float depth_ = 0.0f;
   // What is left of light from behind, per colour.
   float through_[kColours];
   LitSteps<kColours> lit_;
+  // Steps whose light is located, and where it is.
+  bool isLocated_ = false;
+  LitPart<kColours> located_;
+  Places places_[MarchScene::kMostSuns];
+  Cells cells_;
   Floats sums_[kMostSums];
 };
 
