@@ -141,11 +141,15 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
     line.sequence = Sequence::of(line.arguments);
     line.calls = {line.sequence->size(),
                   [sequence = *line.sequence](std::size_t i) { return sequence.call(i); },
-                  line.sequence->made(), false, "frames"};
+                  line.sequence->made(),
+                  false,
+                  "frames",
+                  "frames"};
   }
   if (line.wedge) {
     line.calls.count = line.wedge->size();
     line.calls.list = "wedge";
+    line.calls.word = "calls";
     // Densities that differ would be hidden by extinctions that suit each of them.
     line.calls.variesInputs = command.app.get_option_no_throw("--extinction") != nullptr;
     for (std::size_t i = 0; i != line.calls.count; ++i) line.calls.made.push_back(i);
@@ -154,7 +158,8 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
       own.insert(own.begin(), typed.begin(), typed.end());
       std::vector<std::string> all = withSettings(std::move(own));
       if (hasSheet) all = withPreview(std::move(all), command.app);
-      return Call{wedge.label(i), {}, {{"values", wedge.values(i)}}, wedge.named(std::move(all), i, command.app)};
+      return Call{
+          wedge.label(i), {}, {{"values", wedge.values(i)}}, wedge.named(std::move(all), i, command.app)};
     };
   }
   return line;

@@ -53,31 +53,24 @@ bool namesFile(const CLI::Option& option) {
   return option.get_type_name().find("FILE") != std::string::npos;
 }
 
-/// "float grid 'density' of class 2": what must not change from frame to frame.
-struct GridKind {
-  std::string name, type;
-  VdbGridInfo::Class gridClass;
-  bool operator==(const GridKind&) const = default;
-};
-
+/// What must not change from frame to frame: which grid is looked at, and that it is a level set, or none.
 struct Grids {
-  std::optional<GridKind> firstScalar;
+  std::string first;
   std::vector<std::string> names;
   Vec3f voxelSize{};
 
   explicit Grids(const std::string& path) {
     for (const VdbGrid& grid : readVdbHeaders(path)) {
       const VdbGridInfo info = describe(grid);
-      names.push_back(info.name);
-      if (firstScalar || valuesOf(grid) != VdbValues::scalar) continue;
-      firstScalar = GridKind{info.name, info.type, info.gridClass};
+      const bool isLevel = info.gridClass == VdbGridInfo::Class::levelSet;
+      names.push_back(fmt::format("'{}'{}", info.name, isLevel ? " (level set)" : ""));
+      if (!first.empty() || valuesOf(grid) != VdbValues::scalar) continue;
+      first = names.back();
       voxelSize = info.voxelSize;
     }
     std::ranges::sort(names);
   }
-  std::string text() const {
-    return names.empty() ? "no grid" : fmt::format("'{}'", fmt::join(names, "', '"));
-  }
+  std::string text() const { return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")); }
 };
 
 }  // namespace
@@ -176,14 +169,16 @@ void Sequence::requireSameGrids(const File& file, const Run& run) const {
     run.check();
     const std::string path = file.path(frame);
     const Grids other(path);
-    if (other.firstScalar != first.firstScalar)
-      throw Error(fmt::format("{}: its grids are {}, and those of {} are {}: frames must hold the same", path,
-                              other.text(), firstPath, first.text()));
+    const auto listed = [&] {
+      return fmt::format("{}: its grids are {}, and those of {} are {}", path, other.text(), firstPath,
+                         first.text());
+    };
+    if (other.first != first.first)
+      throw Error(listed() + ": the first of numbers must be the same in all frames");
     const bool differs = other.names != first.names || other.voxelSize != first.voxelSize;
     if (differs && !isNoted)
       run.note(other.names != first.names
-                   ? fmt::format("{}: its grids are {}, and those of {} are {}", path, other.text(),
-                                 firstPath, first.text())
+                   ? listed()
                    : fmt::format("{}: its voxels are {:g} wide, and those of {} {:g}", path,
                                  other.voxelSize.x, firstPath, first.voxelSize.x));
     isNoted = isNoted || differs;

@@ -56,7 +56,7 @@ std::vector<std::string> rendered(const std::vector<MadeCall>& made, const Verb&
   SeveralCalls calls;
   calls.count = made.size();
   calls.variesInputs = true;
-  calls.list = "pictures";
+  calls.list = calls.word = "pictures";
   calls.at = [&](std::size_t i) {
     Call call{made[i].name,
               {},

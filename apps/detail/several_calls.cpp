@@ -102,12 +102,12 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       run.endPart();
       run.note(
           fmt::format("ended at {}: {} of {} {} are whole; the same call with --skip-existing makes the rest",
-                      call.name, i, count, calls.list));
+                      call.name, i, count, calls.word));
       throw;
     }
   }
   run.part.reset();
-  if (skipped > 0) run.note(fmt::format("{} of {} {} were there and whole", skipped, count, calls.list));
+  if (skipped > 0) run.note(fmt::format("{} of {} {} were there and whole", skipped, count, calls.word));
   run.stats[calls.list] = std::move(list);
   if (range)
     run.stats["range"] = {{"box",

@@ -16,8 +16,8 @@ struct SeveralCalls {
   std::vector<std::size_t> made{};
   /// Inputs differ, so that what is chosen from them is chosen from all.
   bool variesInputs = false;
-  /// What --stats calls their list: "frames"
-  std::string list;
+  /// What --stats calls their list, and what messages call them: "frames"
+  std::string list, word;
   bool skipExisting = false;
 };
 
