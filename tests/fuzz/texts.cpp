@@ -4,6 +4,7 @@
 #include <CLI/App.hpp>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "apps/app.h"
 #include "apps/options/config_file.h"
@@ -11,6 +12,7 @@
 #include "apps/options/field_value.h"
 #include "apps/options/layer_recipe.h"
 #include "apps/options/velocity_options.h"
+#include "apps/wedge.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/printable.h"
@@ -134,6 +136,16 @@ void useFieldTexts(const Input& input) {
     apps::VelocityArguments velocity;
     apps::parseVelocity("--velocity", text, velocity);
     sample(velocity.field(1.0));
+  });
+  mayFail("--wedge", [&] {
+    CLI::App app("", "cloud");
+    const apps::BoundVerb bound = apps::cloudVerb().bind(app);
+    std::vector<std::string> words{"-o", "a.vdb", "--wedge", "seed=" + text};
+    const auto wedge = apps::Wedge::taken(words, app);
+    expect(wedge && wedge->size() > 0 && wedge->size() <= apps::Wedge::kMost, "a wedge of no size");
+    std::set<std::string> names;
+    for (std::size_t i = 0; i != wedge->size(); ++i) names.insert(wedge->named(words, i, app)[1]);
+    expect(names.size() == wedge->size(), "two calls of a wedge write the same file");
   });
   std::vector<std::string> lines;
   for (std::size_t begin = 0; begin < text.size();) {
