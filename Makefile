@@ -13,7 +13,7 @@ STRICT := OFF
 SECONDS := 60
 FORMATS :=
 
-.PHONY: all deps build demo test test-sanitized fuzz test-farm bench docs format lint install clean
+.PHONY: all deps build demo examples test test-sanitized fuzz test-farm bench docs format lint install clean
 
 all: build
 
@@ -28,6 +28,10 @@ build: deps
 
 demo: build
 	sh data/demo.sh build/bin/nephele $(RESULTS)
+
+# The models that README and docs/ work with.
+examples: build
+	cmake --build build --target examples
 
 test: deps
 	cmake --preset release -DNEPHELE_BUILD_TESTS=ON -DNEPHELE_BUILD_BENCHMARKS=OFF -DNEPHELE_WARNINGS_AS_ERRORS=$(STRICT)
@@ -78,4 +82,4 @@ install: build
 	cmake --install build --prefix $(PREFIX)
 
 clean:
-	rm -rf build build-debug build-asan build-fuzz build-tsan bench-results
+	rm -rf examples build build-debug build-asan build-fuzz build-tsan bench-results

@@ -1,109 +1,24 @@
-// Makes the meshes of this folder: nephele_generate_data FOLDER
-//
-// Shapes are signed distances (or nearly so), positive inside, in plain double arithmetic, so that every
-// machine makes the same files. They are sampled, meshed by marching cubes, and the vertices are then spread
-// evenly and put back on the exact surface.
+// Makes the meshes of this folder, or the models that the documentation works with: nephele_generate_data
+// data|examples FOLDER
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
+#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "nephele/levelset/grid/brick_grid.h"
+#include "data/models/animals.h"
+#include "data/models/implicit_mesh.h"
+#include "data/models/sphere_grid.h"
 #include "nephele/levelset/io/mesh_io.h"
-#include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/render/image/png_io.h"
 
 namespace {
 
 using namespace nephele;
-using Shape = std::function<double(const Vec3d&)>;
 
 constexpr double kFullTurn = 6.283185307179586;
-
-Vec3d rounded(const Vec3d& p, double perUnit) {
-  return {std::round(p.x * perUnit) / perUnit, std::round(p.y * perUnit) / perUnit,
-          std::round(p.z * perUnit) / perUnit};
-}
-
-BrickGrid sampled(const Shape& shape, const Vec3d& low, const Vec3d& high, double voxelSize) {
-  BrickGrid grid;
-  grid.indexToWorld().linear = Mat3f::scaling(float(voxelSize));
-  grid.voxelSize() = float(voxelSize);
-  grid.background() = -1;
-  const double brickSize = voxelSize * BrickGrid::kBrick;
-  for (int axis = 0; axis < 3; ++axis) {
-    grid.firstBrick()[axis] = int(std::floor(low[axis] / brickSize));
-    grid.brickCount()[axis] = int(std::floor(high[axis] / brickSize)) + 1 - grid.firstBrick()[axis];
-  }
-  grid.values().assign(BrickGrid::kVolume, grid.background());
-  grid.ranges().push_back({grid.background(), grid.background()});
-  for (int z = 0; z < grid.brickCount().z; ++z) {
-    for (int y = 0; y < grid.brickCount().y; ++y) {
-      for (int x = 0; x < grid.brickCount().x; ++x) {
-        const Vec3i origin = (grid.firstBrick() + Vec3i{x, y, z}) * BrickGrid::kBrick;
-        grid.table().push_back(std::int32_t(grid.poolSize()));
-        grid.ranges().push_back({-1e30f, 1e30f});
-        for (int k = -1; k < 10; ++k) {
-          for (int j = -1; j < 10; ++j) {
-            for (int i = -1; i < 10; ++i) {
-              grid.values().push_back(
-                  float(shape(Vec3d(origin + Vec3i{i, j, k}) * double(float(voxelSize)))));
-            }
-          }
-        }
-      }
-    }
-  }
-  return grid;
-}
-
-Vec3d gradient(const Shape& shape, const Vec3d& p) {
-  constexpr double kStep = 1e-5;
-  Vec3d g;
-  for (int axis = 0; axis < 3; ++axis) {
-    Vec3d step;
-    step[axis] = kStep;
-    g[axis] = (shape(p + step) - shape(p - step)) / (2 * kStep);
-  }
-  return g;
-}
-
-// Steps of Newton's method along the gradient; where the shape has a kink the vertex stays near where it was.
-Vec3d onSurface(const Shape& shape, Vec3d p) {
-  for (int i = 0; i < 4; ++i) {
-    const Vec3d g = gradient(shape, p);
-    p += g * (-shape(p) / std::max(dot(g, g), 0.25));
-  }
-  return p;
-}
-
-Mesh meshOf(const Shape& shape, const Vec3d& low, const Vec3d& high, double voxelSize, int smoothingSteps) {
-  Mesh mesh = marchingCubes(sampled(shape, low, high, voxelSize));
-  for (int step = 0; step < smoothingSteps; ++step) {
-    std::vector<Vec3d> sum(mesh.positions.size());
-    std::vector<int> count(mesh.positions.size());
-    for (std::size_t c = 0; c < mesh.corners.size(); c += 3) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::uint32_t v = mesh.corners[c + i];
-        sum[v] += mesh.positions[mesh.corners[c + (i + 1) % 3]];
-        ++count[v];
-      }
-    }
-    for (std::size_t v = 0; v < sum.size(); ++v)
-      mesh.positions[v] = onSurface(shape, sum[v] / double(count[v]));
-  }
-  for (Vec3d& p : mesh.positions) p = rounded(p, 1e4);
-  return mesh;
-}
-
-// The larger of both, with a fillet of about `radius`.
-double blended(double a, double b, double radius) {
-  const double h = std::max(radius - std::abs(a - b), 0.0);
-  return std::max(a, b) + h * h / (4 * radius);
-}
 
 struct Ball {
   Vec3d center;
@@ -182,58 +97,38 @@ Mesh linkedToriAndCone() {
   return meshOf(shape, {-1.5, -0.9, -0.9}, {1.3, 1.2, 0.9}, 0.05, 6);
 }
 
-// Longitudes and latitudes with texture coordinates over the unit square: u turns about y, v rises from the
-// south pole. Corners at a pole take the u of the middle of their face.
 Mesh uvSphere(int longitudes, int latitudes) {
-  Mesh mesh;
-  MeshAttribute uv{"uv", MeshAttribute::Domain::corner, 2, {}};
-  mesh.positions.push_back({0, -1, 0});
-  for (int j = 1; j < latitudes; ++j) {
-    const double up = kFullTurn / 2 * (double(j) / latitudes - 0.5);
-    for (int i = 0; i < longitudes; ++i) {
-      const double turn = kFullTurn * i / longitudes;
-      mesh.positions.push_back(
-          rounded({std::cos(up) * std::sin(turn), std::sin(up), std::cos(up) * std::cos(turn)}, 1e6));
-    }
-  }
-  mesh.positions.push_back({0, 1, 0});
-  const auto vertex = [&](int i, int j) {
-    if (j == 0) return std::uint32_t(0);
-    if (j == latitudes) return std::uint32_t(mesh.positions.size() - 1);
-    return std::uint32_t(1 + (j - 1) * longitudes + i % longitudes);
-  };
-  for (int j = 0; j < latitudes; ++j) {
-    for (int i = 0; i < longitudes; ++i) {
-      std::vector<std::uint32_t> face;
-      const auto add = [&](double u, int column, int row) {
-        face.push_back(vertex(column, row));
-        uv.values.insert(uv.values.end(), {float(u / longitudes), float(double(row) / latitudes)});
-      };
-      if (j == 0) add(i + 0.5, i, j);
-      if (j > 0) add(i, i, j);
-      if (j > 0) add(i + 1, i + 1, j);
-      if (j + 1 < latitudes) add(i + 1, i + 1, j + 1);
-      if (j + 1 < latitudes) add(i, i, j + 1);
-      if (j + 1 == latitudes) add(i + 0.5, i, j + 1);
-      mesh.addFace(face);
-    }
-  }
-  mesh.attributes.push_back(uv);
-  return mesh;
+  return sphereGrid(longitudes, latitudes, [](double u, double v) {
+    const double turn = kFullTurn * u;
+    const double up = kFullTurn / 2 * (v - 0.5);
+    return rounded({std::cos(up) * std::sin(turn), std::sin(up), std::cos(up) * std::cos(turn)}, 1e6);
+  });
+}
+
+void makeData(const std::string& folder) {
+  writeMesh(folder + "/sphere_uv.obj", uvSphere(48, 24));
+  writeMesh(folder + "/linked_tori_and_cone.obj", linkedToriAndCone());
+  writeMesh(folder + "/cloud_base.obj", cloudBase());
+}
+
+void makeExamples(const std::string& folder) {
+  writeMesh(folder + "/hare.obj", hareMesh());
+  writeMesh(folder + "/whale.obj", whaleMesh());
+  writeMesh(folder + "/clownfish.obj", clownfishMesh());
+  writePng(folder + "/clownfish.png", clownfishTexture(1024, 1024), {});
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: %s FOLDER\n", argv[0]);
+  const std::string what = argc == 3 ? argv[1] : "";
+  if (what != "data" && what != "examples") {
+    std::fprintf(stderr, "usage: %s data|examples FOLDER\n", argv[0]);
     return 2;
   }
   try {
-    const std::string folder = argv[1];
-    writeMesh(folder + "/sphere_uv.obj", uvSphere(48, 24));
-    writeMesh(folder + "/linked_tori_and_cone.obj", linkedToriAndCone());
-    writeMesh(folder + "/cloud_base.obj", cloudBase());
+    std::filesystem::create_directories(argv[2]);
+    what == "data" ? makeData(argv[2]) : makeExamples(argv[2]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
     return 1;
