@@ -166,14 +166,15 @@ struct Seen {
   bool isGround = false;
 };
 
-// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray, no farther than `most`.
+// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray; no farther than `most` and through the
+// ground, if that is given.
 template <std::size_t kKinds, class Sources>
 Seen<kKinds> lookAlong(const Atmosphere& atmosphere, double radius, double rise, int steps,
                        const Sources& sourcesAt, double most = std::numeric_limits<double>::infinity()) {
   Seen<kKinds> seen;
-  const double ground = wayToGround(radius, rise);
-  seen.isGround = ground >= 0 && ground <= most;
-  seen.way = std::min(ground >= 0 ? ground : wayToTop(radius, rise), most);
+  const double ground = std::isinf(most) ? wayToGround(radius, rise) : -1;
+  seen.isGround = ground >= 0;
+  seen.way = std::min(seen.isGround ? ground : wayToTop(radius, rise), most);
   double before = 0;
   for (int i = 0; i != steps; ++i) {
     // Shorter near the eye, where the air is densest.
