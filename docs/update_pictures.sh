@@ -84,7 +84,10 @@ if picture looks_day; then
     [ $look != wisps ] || verb=wisps
     grow "look_$look.vdb" $verb --look "$look" --resolution 224
     for sun in "100,12 1" "140,62 0" "85,3 2.5"; do
-      show "look_${look}_${sun%% *}" "look_$look.vdb" --look "$look" --sun "${sun% *}" --exposure "${sun#* }" --size 384x216
+      exposure=${sun#* }
+      # Their own sky is as bright at any time, and so is fire.
+      case $look in storm | overcast | explosion) exposure=0 ;; esac
+      show "look_${look}_${sun%% *}" "look_$look.vdb" --look "$look" --sun "${sun% *}" --exposure "$exposure" --size 384x216
       files="$files look_${look}_${sun%% *}.png"
     done
   done

@@ -17,11 +17,11 @@ struct FirstDay {
 
 const std::vector<FirstDay>& firstDays() {
   static const std::vector<FirstDay> all{
-      {"cloud", "Files", {"--output", "--surface"}},
+      {"cloud", "Files", {"--output"}},
       {"cloud",
        "Shape",
        {"--species", "--shape-seed", "--resolution", "--layers", "--amplitude", "--frequency"}},
-      {"cloud", "Detail", {"--roughness", "--billow", "--noise", "--advect", "--seed"}},
+      {"cloud", "Detail", {"--roughness", "--billow", "--advect", "--seed"}},
       {"cloud", "Density", {"--edge-thickness", "--density", "--flat-base"}},
       {"cloud", "Sequences and wedges", {"--frames", "--wedge", "--contact-sheet"}},
       {"cut", "Files", {"--output", "--format", "--explode"}},
@@ -84,6 +84,8 @@ int showFirstDay(CLI::App& app, std::string_view verb) {
       if (day.verb == verb)
         if (CLI::Option* option = app.get_option_no_throw(std::string(name)))
           option->group(std::string(day.group));
+  if (CLI::Option* option = app.get_option_no_throw("--contact-sheet"))
+    if (option->get_group() == kSeveralGroup) option->group("");
   for (const char* name : {"--help", "--help-all", "--config"})
     if (CLI::Option* option = app.get_option_no_throw(name)) option->group("Help");
   for (CLI::Option* option : options) forgetHidden(*option);

@@ -41,8 +41,8 @@ class ClearSky {
   struct Air {
     Vec3f left{1, 1, 1}, light{};
   };
-  /// Of a place in a direction, of any length but zero, and at a distance in metres; no farther than the
-  /// ground or where the atmosphere ends.
+  /// Of a place in a direction, of any length but zero, and at a distance in metres; no farther than
+  /// where the atmosphere ends, and as if there were no ground.
   Air airBefore(const Vec3f& towards, float metres) const;
   /// Turned by `degrees` about y, azimuths growing.
   ClearSky turned(double degrees) const;

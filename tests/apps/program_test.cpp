@@ -44,8 +44,8 @@ TEST(Program, HelpShowsTheOptionsOfAFirstDayAndLeadsToAll) {
        {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render", "turntable", "info"}) {
     const ProgramResult help = runProgram(verb + " --help"), all = runProgram(verb + " --help-all");
     EXPECT_EQ(help.exitCode, 0) << verb;
-    // Fifteen or so, and three of help.
-    EXPECT_LE(optionsShown(help.output), 19) << verb;
+    // Fifteen or so, three of help, and --frames and --wedge.
+    EXPECT_LE(optionsShown(help.output), 20) << verb;
     EXPECT_EQ(runProgram("help " + verb).output, help.output) << verb;
     EXPECT_NE(help.output.find("'nephele " + verb + " --help-all' shows all"), std::string::npos) << verb;
     EXPECT_NE(help.output.find("Example:\n  nephele " + verb), std::string::npos) << verb;
