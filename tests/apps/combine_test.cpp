@@ -14,10 +14,10 @@ namespace {
 
 class Combine : public testing::Test {
  protected:
-  /// Cubes of volume 8 that share a half.
+  /// A cube of volume 8 and a box of 11.52 that holds half of it.
   void SetUp() override {
     writeMesh(file("a.obj"), boxMesh({-1, -1, -1}, {1, 1, 1}));
-    writeMesh(file("b.obj"), boxMesh({0, -1, -1}, {2, 1, 1}));
+    writeMesh(file("b.obj"), boxMesh({0, -1.2, -1.2}, {2, 1.2, 1.2}));
     writeMesh(file("far.obj"), boxMesh({8, -1, -1}, {10, 1, 1}));
   }
   std::string file(const std::string& name) const { return folder_.file(name); }
@@ -41,14 +41,15 @@ class Combine : public testing::Test {
 };
 
 TEST_F(Combine, OfLevelSetsIsUnionIntersectionOrCutout) {
-  const std::string voxels = "--voxel-size 0.05 ";
-  EXPECT_NEAR(volume("a.obj b.obj", voxels), 12, 0.01);
+  // Faces lie between voxels.
+  const std::string voxels = "--voxel-size 0.047 ";
+  EXPECT_NEAR(volume("a.obj b.obj", voxels), 15.52, 0.02);
   EXPECT_EQ(stats()["inputs"].size(), 2u);
-  EXPECT_NEAR(stats()["inputs"][1]["volume"], 8, 1e-9);
-  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine union"), 12, 0.01);
-  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine intersection"), 4, 0.01);
-  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine cutout"), 4, 0.01);
-  EXPECT_NEAR(volume("a.obj b.obj far.obj", voxels), 20, 0.02);
+  EXPECT_NEAR(stats()["inputs"][1]["volume"], 11.52, 1e-9);
+  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine union"), 15.52, 0.02);
+  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine intersection"), 4, 0.02);
+  EXPECT_NEAR(volume("a.obj b.obj", voxels + "--combine cutout"), 4, 0.02);
+  EXPECT_NEAR(volume("a.obj b.obj far.obj", voxels), 23.52, 0.03);
   // The longest side is that of all: 3.
   volume("a.obj b.obj", "--resolution 60");
   EXPECT_NEAR(stats()["grid"]["voxel_size"], 0.05, 1e-9);
@@ -64,27 +65,27 @@ TEST_F(Combine, TakesLevelSetsByTheirValuesWhereTheirVoxelsFit) {
   volume("a.obj b.obj", "--voxel-size 0.05 --combine cutout");
   const auto meshes = valuesOf();
   // Without an option the voxels are those of the first.
-  EXPECT_NEAR(volume("a.vdb b.vdb", "--combine cutout"), 4, 0.01);
+  EXPECT_NEAR(volume("a.vdb b.vdb", "--combine cutout"), 4, 0.02);
   const auto levels = valuesOf();
   EXPECT_EQ(meshes->brickCount(), levels->brickCount());
   EXPECT_TRUE(std::equal(meshes->values().begin(), meshes->values().end(), levels->values().begin(),
                          levels->values().end()));
-  EXPECT_NEAR(volume("a.vdb b.obj", "--combine intersection"), 4, 0.01);
-  EXPECT_NEAR(volume("a.vdb b.vdb", "--voxel-size 0.04"), 12, 0.03);
-  EXPECT_NEAR(volume("a.vdb", "--voxel-size 0.04"), 8, 0.03);
+  EXPECT_NEAR(volume("a.vdb b.obj", "--combine intersection"), 4, 0.02);
+  EXPECT_NEAR(volume("a.vdb b.vdb", "--voxel-size 0.043"), 15.52, 0.05);
+  EXPECT_NEAR(volume("a.vdb", "--voxel-size 0.043"), 8, 0.03);
 }
 
 TEST_F(Combine, BlendsWhereSurfacesMeet) {
   writeMesh(file("across.obj"), boxMesh({-0.5, -2, -0.5}, {0.5, 2, 0.5}));
-  const double sharp = volume("a.obj across.obj", "--voxel-size 0.05");
+  const double sharp = volume("a.obj across.obj", "--voxel-size 0.047");
   EXPECT_NEAR(sharp, 10, 0.02);
-  // In the corner between two faces at a right angle, x and y away from them, the blended surface is where
-  // -min(x, y) + (w - |x - y|)^2 / 4 w = 0: an area of w^2 (1 / 4 - 5 / 48 ...), at least of some percent of
-  // w^2.
-  const double blended = volume("a.obj across.obj", "--voxel-size 0.05 --blend 0.4");
-  EXPECT_GT(blended, sharp + 8 * 0.02 * 0.16);
-  EXPECT_LT(blended, sharp + 8 * 0.5 * 0.16);
-  EXPECT_NEAR(volume("a.obj across.obj", "--voxel-size 0.05 --blend 10%"), blended, 1e-6);
+  // Where faces meet at a right angle, at the depths x and y outside of them, the surface moves to where
+  // (w - |x - y|)^2 / 4 w = min(x, y): an area of w^2 / 6 along eight edges of length 1, whose moment, w^3 /
+  // 30, turns by a quarter around each of eight corners.
+  const double w = 0.4, pi = 3.14159265358979, filled = 8 * (w * w / 6 + pi / 2 * w * w * w / 30);
+  const double blended = volume("a.obj across.obj", "--voxel-size 0.047 --blend 0.4");
+  EXPECT_NEAR(blended - sharp, filled, 0.02 * filled);
+  EXPECT_NEAR(volume("a.obj across.obj", "--voxel-size 0.047 --blend 10%"), blended, 1e-6);
 }
 
 TEST_F(Combine, CloudsGrowOnTheUnion) {
@@ -93,7 +94,7 @@ TEST_F(Combine, CloudsGrowOnTheUnion) {
   ASSERT_EQ(result.exitCode, 0) << result.errors;
   const Mesh shape = readMesh(file("shape.obj"));
   EXPECT_TRUE(topologyOf(shape).isClosedManifold());
-  EXPECT_NEAR(signedVolume(shape), 12, 0.1);
+  EXPECT_NEAR(signedVolume(shape), 15.52, 0.15);
   EXPECT_NEAR(boundingBox(shape).max.x, 2, 0.01);
   const auto grid = toBricks(readScalarGrid(file("out.vdb")));
   const float voxel = grid->voxelSize();
