@@ -73,8 +73,8 @@ TEST_F(CloudCache, MakesLayersAnewWhereTheyAreOthers) {
   std::ofstream(file("layers.toml")) << "[[layer]]\namplitude = \"1%\"\n";
   const std::string recipe = "--recipe " + file("layers.toml");
   for (const std::string& options :
-       {std::string("--seed 2"), std::string("--amplitude 3%"),
-        std::string("--medial-smoothing 2"), std::string("--noise worley"), recipe})
+       {std::string("--seed 2"), std::string("--amplitude 3%"), std::string("--medial-smoothing 2"),
+        std::string("--noise worley"), recipe})
     EXPECT_FALSE(isReused(options)) << options;
   EXPECT_TRUE(isReused(recipe));
   std::ofstream(file("layers.toml")) << "[[layer]]\namplitude = \"2%\"\n";

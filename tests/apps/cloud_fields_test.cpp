@@ -149,6 +149,35 @@ TEST_F(CloudFields, OfOneValueAreThatConstant) {
   EXPECT_EQ(constants->table(), fields->table());
 }
 
+TEST_F(CloudFields, OfNoiseLieBetweenTheirValuesAndReachBoth) {
+  const auto noise = density("noise:4x,2:1,3");
+  float least = 10, most = 0;
+  for (int k = -8; k <= 8; ++k)
+    for (int j = -8; j <= 8; ++j)
+      for (int i = -8; i <= 8; ++i) {
+        least = std::min(least, noise->at({i, j, k}));
+        most = std::max(most, noise->at({i, j, k}));
+      }
+  EXPECT_GE(least, 1);
+  EXPECT_LE(most, 3);
+  // 17 voxels are nearly two waves of it: noise beyond its rms, of either sign.
+  EXPECT_LT(least, 1.4f);
+  EXPECT_GT(most, 2.6f);
+}
+
+TEST_F(CloudFields, MultiplyAsTheirValuesDo) {
+  const auto height = density("height:0=1,1=3"), noise = density("noise:3x:0.5,2"),
+             both = density("height:0=1,1=3*noise:3x:0.5,2"),
+             three = density("2*height:0=1,1=3*noise:3x:0.5,2");
+  for (int k = -6; k <= 6; k += 3)
+    for (int j = -6; j <= 6; j += 2)
+      for (int i = -6; i <= 6; i += 2) {
+        const float product = height->at({i, j, k}) * noise->at({i, j, k});
+        EXPECT_NEAR(both->at({i, j, k}), product, 1e-4f * product);
+        EXPECT_NEAR(three->at({i, j, k}), 2 * product, 2e-4f * product);
+      }
+}
+
 TEST_F(CloudFields, AmplitudeLeavesThePlainPartsPlain) {
   const std::string common = "--resolution 48 --layers 2 --edge-thickness 5% --amplitude ";
   const auto bare = grown(common + "0"), half = grown(common + "along:1,0,0:0.5=0,0.5=4%");
@@ -291,6 +320,11 @@ TEST(CloudFieldOptions, AreUsageErrorsThatNameTheOptionAndWhatIsAllowed) {
       {"--amplitude attribute:growth", "attribute:NAME:"},
       {"--amplitude attribute::0,1%", "attribute:NAME:"},
       {"--amplitude attribute:growth:0", "two values"},
+      {"--amplitude noise:0x:0,1%", "a frequency above 0"},
+      {"--amplitude noise:3x,9:0,1%", "octaves from 1 to 8"},
+      {"--amplitude noise:3x", "two values"},
+      {"--amplitude 2%*height:0=1%,1=2", "'1%' a number from 0"},
+      {"--amplitude 2%*", "a number from 0"},
       {"--noise-period 2", "--noise-time"},
       {"--noise-time soon", "a number from"},
       {"--noise perln", "worley_difference"},

@@ -170,7 +170,8 @@ TEST_F(CloudRecipe, ThoseOfTheDocumentationAreRead) {
 
 TEST_F(CloudRecipe, IsToldWithVerbose) {
   grown("[[layer]]\nnoise = \"gabor\"\namplitude = \"height:0=0.01,1=0.02\"\n", "--resolution 24 --verbose");
-  EXPECT_NE(notes.find("layer 1: gabor, frequency 2.2, amplitude 0.01 to 0.02, billow 0.5"), std::string::npos)
+  EXPECT_NE(notes.find("layer 1: gabor, frequency 2.2, amplitude 0.01 to 0.02, billow 0.5"),
+            std::string::npos)
       << notes;
 }
 

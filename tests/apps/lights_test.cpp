@@ -45,6 +45,57 @@ class LightOptions : public testing::Test {
 };
 TemporaryFolder* LightOptions::data_ = nullptr;
 
+TEST_F(LightOptions, ASkyThatIsNotGivenIsClear) {
+  const Image standard = picture(""), clear = picture("--sky clear --sun 90,38"),
+              even = picture("--sky 0.1,0.17,0.28");
+  for (const char* name : {"R", "G", "B"}) {
+    EXPECT_EQ(standard.at(name, 8, 6), clear.at(name, 8, 6)) << name;
+    EXPECT_NE(standard.at(name, 8, 6), even.at(name, 8, 6)) << name;
+  }
+}
+
+TEST_F(LightOptions, AClearSkyStandsBehindPreviewsUnlessToldNotTo) {
+  const std::string preview = "--preview " + file("a.png");
+  EXPECT_TRUE(picture(preview).find("backdrop.R"));
+  for (const std::string& options : {std::string(), preview + " --no-backdrop",
+                                     preview + " --background 0,0,0", preview + " --sky 0.1,0.1,0.2"})
+    EXPECT_FALSE(picture(options).find("backdrop.R")) << options;
+}
+
+TEST_F(LightOptions, ScaleGivesTheExtinctionOfARealCloud) {
+  // The ball is 2 across, and its density 1: 0.075 per metre of 500 metres per unit.
+  const ProgramResult result = render("--scale 1km --aov none");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_NE(result.output.find("extinction 37.5 per"), std::string::npos) << result.output;
+  EXPECT_NE(render("--scale 1km --extinction 3").output.find("extinction 3 per"), std::string::npos);
+  for (const char* bad : {"1", "0km", "-3m", "1e9km", "far"}) {
+    const ProgramResult refused = render(fmt::format("--scale {}", bad));
+    EXPECT_EQ(refused.exitCode, 2) << bad;
+    EXPECT_NE(refused.errors.find("--scale"), std::string::npos) << refused.errors;
+  }
+}
+
+TEST_F(LightOptions, AirIsBeforeWhatIsFarAway) {
+  const std::string large = "--scale 8km --aov light,Z_mean";
+  const Image without = picture(large), with = picture(large + " --aerial-perspective");
+  for (const char* name : {"R", "G", "B"}) {
+    const float air = with.at(fmt::format("light_air.{}", name), 8, 6);
+    EXPECT_GT(air, 0.01f) << name;
+    float sum = air;
+    for (const char* light : {"sun", "sky"}) {
+      const float before = without.at(fmt::format("light_{}.{}", light, name), 8, 6),
+                  after = with.at(fmt::format("light_{}.{}", light, name), 8, 6);
+      EXPECT_LT(after, 0.95f * before) << light << name;
+      sum += after;
+    }
+    // R, G, B are 16 bit.
+    EXPECT_NEAR(sum, with.at(name, 8, 6), 1e-3f * sum);
+  }
+  EXPECT_FALSE(picture("--aerial-perspective --aov none").find("Z_mean"));
+  EXPECT_EQ(render("--aerial-perspective --sky 0.1,0.1,0.2").exitCode, 2);
+  EXPECT_EQ(render("--aerial-perspective --deep " + file("d.exr")).exitCode, 2);
+}
+
 TEST_F(LightOptions, EveryLightHasALayerOfItsName) {
   const Image image = picture(
       "--aov light --sun 30,40 --sun key=90,20,2 --point 0,3,0,5 --point lamp=2,0,0,1,2,3 "
