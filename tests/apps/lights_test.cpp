@@ -63,10 +63,10 @@ TEST_F(LightOptions, AClearSkyStandsBehindPreviewsUnlessToldNotTo) {
 }
 
 TEST_F(LightOptions, ScaleGivesTheExtinctionOfARealCloud) {
-  // The ball is 2 across, and its density 1: 0.075 per metre of 500 metres per unit.
+  // The ball is 2.2 across with its edge, and its density 1: 0.075 per metre, of 1000 / 2.2 metres per unit.
   const ProgramResult result = render("--scale 1km --aov none");
   EXPECT_EQ(result.exitCode, 0) << result.errors;
-  EXPECT_NE(result.output.find("extinction 37.5 per"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("extinction 34.0909 per"), std::string::npos) << result.output;
   EXPECT_NE(render("--scale 1km --extinction 3").output.find("extinction 3 per"), std::string::npos);
   for (const char* bad : {"1", "0km", "-3m", "1e9km", "far"}) {
     const ProgramResult refused = render(fmt::format("--scale {}", bad));
