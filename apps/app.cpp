@@ -175,6 +175,7 @@ void check(Command& command, const Line& line, const Run& run) {
   for (std::size_t i = 1; line.wedge && i < line.calls.count; ++i)
     Command(command.verb).parse(line.calls.at(i).arguments);
   tryOutputs(command.app);
+  if (line.isSeveral() && !command.options.contactSheet.empty()) requireSeen(command.app);
   for (const char* option : {"--only", "--shard", "--skip-existing", "--contact-sheet"}) {
     const bool isOfFrames = option == std::string_view("--only") || option == std::string_view("--shard");
     if (!command.hasOwnFrames() && given(command.app, option) &&

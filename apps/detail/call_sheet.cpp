@@ -58,11 +58,11 @@ std::vector<std::string> rendered(const std::vector<MadeCall>& made, const Verb&
   calls.variesInputs = true;
   calls.list = calls.word = "pictures";
   calls.at = [&](std::size_t i) {
-    Call call{made[i].name,
-              {},
-              {},
-              {made[i].output, "-o", folder.file("picture.exr"), "--preview", pictures[i],
-               made.size() <= 12 ? "--size=640x426" : "--size=320x213", "--aov=none"}};
+    Call call{
+        made[i].name,
+        {},
+        {},
+        {made[i].output, "--preview", pictures[i], made.size() <= 12 ? "--size=640x426" : "--size=320x213"}};
     if (made[i].look.empty()) return call;
     call.arguments.push_back("--look=" + made[i].look);
     call.arguments = withConfigFile({Command(render).app, render.name, {render.name}}, call.arguments);
@@ -97,6 +97,13 @@ std::vector<std::string> withPreview(std::vector<std::string> arguments, const C
   return arguments;
 }
 
+void requireSeen(const CLI::App& first) {
+  const CLI::Option *preview = first.get_option_no_throw("--preview"), *output = first.get_option("--output");
+  if (preview && preview->count() > 0) return;
+  if (output->count() == 0 || !isSeen(output->results().front()))
+    throw CLI::ValidationError("--contact-sheet", "shows previews, volumes and meshes; give --output");
+}
+
 void writeCallSheet(const std::string& path, const std::vector<MadeCall>& calls, std::optional<int> columns,
                     const Verb& render, ProgramRun& run) {
   if (calls.empty()) return;
@@ -105,8 +112,6 @@ void writeCallSheet(const std::string& path, const std::vector<MadeCall>& calls,
   if (!calls.front().preview.empty()) {
     for (const MadeCall& call : calls) pictures.push_back(call.preview);
   } else {
-    if (!isSeen(calls.front().output))
-      refuseValue("--contact-sheet", path, "with outputs that are pictures, volumes or meshes");
     folder.emplace(path);
     pictures = rendered(calls, render, *folder, run);
   }

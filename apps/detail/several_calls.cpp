@@ -58,14 +58,15 @@ std::string valueOf(const CLI::App& app, const std::string& name) {
 }
 
 bool isThere(const Command& command, const std::string& digest, const Run& run) {
-  for (const std::string& path : outputsOf(command.app)) {
+  const std::vector<std::string> outputs = outputsOf(command.app);
+  for (const std::string& path : outputs) {
     if (!std::filesystem::exists(path)) return false;
     const std::string defect = outputDefect(path, digest);
     if (defect.empty()) continue;
     run.note(fmt::format("{}: {}; it is made again", path, defect));
     return false;
   }
-  return true;
+  return !outputs.empty();
 }
 
 }  // namespace

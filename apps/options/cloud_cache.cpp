@@ -9,13 +9,12 @@ namespace nephele::apps {
 namespace {
 
 /// What the levels of a cloud do not depend on, or only by the shape, the voxels and the reach of the edge.
-constexpr std::string_view kOthers[]{"input",      "species",        "shape-seed",     "shape-size",
-                                     "repair",     "subdivide",      "resolution",     "voxel-size",
-                                     "half",       "density",        "edge-thickness", "edge-falloff",
-                                     "flat-base",  "interior-noise", "height-profile", "thin-out",
-                                     "advect",     "advect-steps",   "cache",          "advect-frequency",
-                                     "cache-size", "frames",         "only",           "shard", "wedge",
-                                     "combine",    "blend"};
+constexpr std::string_view kOthers[]{
+    "input",      "species",          "shape-seed",     "shape-size", "repair",         "subdivide",
+    "resolution", "voxel-size",       "half",           "density",    "edge-thickness", "edge-falloff",
+    "flat-base",  "interior-noise",   "height-profile", "thin-out",   "advect",         "advect-steps",
+    "cache",      "advect-frequency", "cache-size",     "frames",     "only",           "shard",
+    "wedge",      "combine",          "blend"};
 
 std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const CloudOptions& options,
                   const Run& run) {
@@ -27,6 +26,9 @@ std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const Clou
     hash.add(attribute.name);
     hash.addNumbers(std::span(attribute.values));
   }
+  // Ramps lie along the box of the shape, in a sequence of all shapes.
+  const Box box = run.box(boundingBox(shape));
+  hash.addNumbers(std::span(&box, 1));
   const bool isMoving = arguments.noiseTime || !arguments.recipe.empty();
   const float edge = options.edgeThickness.range(Box::everywhere()).max;
   return optionsDigest(

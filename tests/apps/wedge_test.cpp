@@ -157,6 +157,9 @@ TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
   refuses(cloud("--wedge seed=1,2,x"), "--seed: got 'x'");
   refuses(cloud("--wedge half=true,yes"), "it is a flag");
   refuses(cloud("--wedge seed=1,2 --frames 1-3"), "leave out --frames");
+  refuses(fmt::format("render '{}' --deep '{}' --wedge fov=20,30 --contact-sheet '{}'", file("ball.vdb"),
+                      file("d.exr"), file("t.png")),
+          "shows previews, volumes and meshes");
   refuses(cloud("--contact-sheet '" + file("t.png") + "'"), "give --frames or --wedge");
 }
 
