@@ -15,22 +15,25 @@ namespace nephele {
 
 namespace {
 
-constexpr int kTile = 16, kDepths = 9;
+// Largest side of a tile in pixels, and how many are to be across a picture at least.
+constexpr int kTile = 16, kTiles = 64;
+constexpr int kDepths = 9;
 
 // The air before the corners of tiles, at depths evenly between two.
 class AirGrid {
  public:
   AirGrid(const Image& image, const Camera& camera, const AerialPerspective& air, float near, float far)
-      : across_((image.width + kTile - 1) / kTile + 1),
+      : tile_(std::clamp(image.width / kTiles, 1, kTile)),
+        across_((image.width + tile_ - 1) / tile_ + 1),
         near_(near),
         perDepth_(far > near ? float(kDepths - 1) / (far - near) : 0.0f) {
-    const int down = (image.height + kTile - 1) / kTile + 1;
+    const int down = (image.height + tile_ - 1) / tile_ + 1;
     nodes_.resize(std::size_t(across_) * std::size_t(down) * kDepths);
     const PixelBox window = camera.window();
     parallelFor(nodes_.size() / kDepths, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i) {
-        const Ray ray = camera.ray(window.x0 + double(i % std::size_t(across_)) * kTile,
-                                   window.y0 + double(i / std::size_t(across_)) * kTile);
+        const Ray ray = camera.ray(window.x0 + double(i % std::size_t(across_)) * tile_,
+                                   window.y0 + double(i / std::size_t(across_)) * tile_);
         const double perDepth = 1 / std::max(dot(ray.direction, camera.forward()), 1e-3);
         for (int n = 0; n != kDepths; ++n) {
           const double depth = double(near) + double(far - near) * n / (kDepths - 1);
@@ -43,7 +46,7 @@ class AirGrid {
   }
 
   ClearSky::Air at(int x, int y, float depth) const {
-    const float u = (float(x) + 0.5f) / kTile, v = (float(y) + 0.5f) / kTile,
+    const float u = (float(x) + 0.5f) / float(tile_), v = (float(y) + 0.5f) / float(tile_),
                 w = std::clamp((depth - near_) * perDepth_, 0.0f, float(kDepths - 1) - 1e-3f);
     const int i = int(u), j = int(v), k = int(w);
     ClearSky::Air result{{}, {}};
@@ -61,7 +64,7 @@ class AirGrid {
   }
 
  private:
-  int across_;
+  int tile_, across_;
   float near_, perDepth_;
   std::vector<ClearSky::Air> nodes_;
 };

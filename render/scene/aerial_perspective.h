@@ -20,7 +20,7 @@ struct AerialPerspective {
 /// light_* and of emission stays, and A times the light of the air is added to R, G, B and to a layer
 /// light_air, which there is where there are layers of lights. A, and pixels in which there is nothing, stay
 /// as they are.
-/// Cost: a ray through the air for every tile of 16 x 16 pixels and 9 depths.
+/// Cost: a ray through the air for every tile, of 16 x 16 pixels in large pictures, and 9 depths.
 /// @throws Error if there is no layer Z_mean, or `air` is outside its range.
 /// Source: Hillaire (2020), section 5.4, whose grid over picture and depth this is.
 void addAir(Image& image, const Camera& camera, const AerialPerspective& air);

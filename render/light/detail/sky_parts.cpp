@@ -7,7 +7,7 @@ namespace nephele::detail {
 
 namespace {
 
-constexpr double kTolerance = 0.01;
+constexpr double kTolerance = 0.025;
 
 // Of their second moments, the eigenvector of the largest eigenvalue, by squaring: what is left of a matrix
 // then lies along it.
@@ -80,9 +80,14 @@ SkyParts partsOfSky(std::span<const Vec3f> radiance) {
     if (isSmall(rest)) break;
   }
   if (!isSmall(rest)) return coloursOfSky(radiance);
+  // The mean of every colour is as it was.
+  Vec3d left{1, 1, 1};
+  for (const Vec3d& value : rest) left -= value * (1 / double(rest.size()));
   for (std::size_t part = 0; part != shares.size(); ++part) {
     result.values.emplace_back(shares[part].begin(), shares[part].end());
-    result.colours.push_back(Vec3f(axes[part] * mean));
+    Vec3d& colour = axes[part];
+    for (int c = 0; c != 3; ++c) colour[c] *= mean[c] / left[c];
+    result.colours.push_back(Vec3f(colour));
   }
   return result;
 }

@@ -16,8 +16,8 @@ struct SkyParts {
   std::vector<Vec3f> colours;
 };
 
-/// The fewest parts that give the radiance of every colour to 1 % of its mean, root mean square over the
-/// directions; three give it exactly. Skies are mostly two: what is blue above and what is pale about the
+/// The fewest parts that give the mean of every colour, and its radiance to 2.5 % of that, root mean square over
+/// the directions; three give it exactly. Skies are mostly two: what is blue above and what is pale about the
 /// horizon.
 ///
 /// By the largest eigenvectors of the colours' second moments, which leave the least (principal components).

@@ -75,7 +75,7 @@ TEST(AddAir, DoesWithEveryPixelWhatTheAirBeforeItDoes) {
   const AerialPerspective air{skyAt(15), 800, 0.7f};
   addAir(after, camera(width, height), air);
   for (int y = 0; y < height; y += 6)
-    for (int x = 0; x < width; x += 7) {
+    for (int x = 0; x < width - 1; x += 7) {
       const Ray ray = camera(width, height).ray(x + 0.5, y + 0.5);
       const double cosine = dot(ray.direction, camera(width, height).forward());
       const ClearSky::Air expected = air.sky.airBefore(
