@@ -1,19 +1,21 @@
 #!/bin/sh
 # Renders the pictures of clouds in docs/pictures again, by the commands of the pages that show them. Volumes stay in FOLDER, and what is
 # there is not grown again; pictures always are. NAME (tutorial_01, lights ...) makes only that picture; without one it makes all of them.
-# Needs oiiotool (Debian's openimageio-tools) and the Stanford bunny of 60 000 triangles.
-# Usage: update_pictures.sh PROGRAM FOLDER BUNNY.obj [NAME ...]
+# Needs oiiotool (Debian's openimageio-tools) and the models of examples/ (make examples). All pictures of animals are of these, but
+# mesh_decimated.png and tutorial_05.jpg, which are of the Stanford bunny.
+# Usage: update_pictures.sh PROGRAM FOLDER [NAME ...]
 set -eu
 program=$(realpath "$1")
-bunny=$(realpath "$3")
 docs=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"
 cd "$2"
-shift 3
+shift 2
 wanted="$*"
-cp -r "$docs/../data/." "$docs/recipes" .
+cp -r "$docs/../data/." "$docs/recipes" "$docs/../examples" .
 
 base=cloud_base.obj
+hare=examples/hare.obj
+fish=examples/clownfish
 usual="--frequency 7x --seed 7"
 
 # grow FILE.vdb VERB ...: unless it is there.
@@ -56,11 +58,11 @@ if picture silver_lining; then
 fi
 
 if picture clear_sky; then
-  grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
+  grow hare.vdb cloud $hare --layers 3 --billow 1
   files=
   for sun in "60 0" "38 0" "15 0.5" "5 2" "1 3.5" "-4 7"; do
     elevation=${sun% *}
-    show "clear_sky_$elevation" bunny.vdb --backdrop --size 480x270 --view 25,3 --sun "130,$elevation" --sky clear --exposure "${sun#* }"
+    show "clear_sky_$elevation" hare.vdb --backdrop --size 480x270 --view 25,3 --sun "130,$elevation" --sky clear --exposure "${sun#* }"
     files="$files clear_sky_$elevation.png"
   done
   padding="" tiles clear_sky.jpg 3x2 $files
@@ -110,10 +112,10 @@ if picture wedge; then
   keep wedge.jpg
 fi
 
-if picture bunny; then
-  grow bunny.vdb cloud "$bunny" --layers 3 --billow 1
-  show bunny bunny.vdb --size 960x720
-  keep bunny.png
+if picture hare; then
+  grow hare.vdb cloud $hare --layers 3 --billow 1
+  show hare hare.vdb --size 960x720
+  keep hare.png
 fi
 
 if picture tutorial_02; then
@@ -294,22 +296,71 @@ if picture figure_3_2; then
   padding="" tiles figure_3_2.jpg 2x1 left.png right.png
 fi
 
-if picture figure_3_5; then
+# surface NAME: NAME_surface.vdb as an object in its own cloud, which cannot be seen.
+surface() {
+  show "$1_surface" "$1.vdb" --size 300x300 --view 20,5 --sun 100,30 --backdrop --density-scale 0.0001 --object "$2.vdb"
+}
+
+if picture figure_3_3; then
+  grow hare_surface.vdb levelset $hare --resolution 360
   files=
-  for b in 0 0.33 0.5 0.67 1 2; do
-    grow bunny_billow_$b.vdb cloud "$bunny" --layers 3 --billow $b $layers
-    figure bunny_billow_$b --extinction 250
-    files="$files bunny_billow_$b.png"
+  for n in 1 2 3; do
+    grow hare_layers_$n.vdb cloud $hare --surface hare_layers_${n}_surface.vdb --layers $n --billow 0 $layers
+    surface hare_layers_$n hare_layers_${n}_surface
+    files="$files hare_layers_${n}_surface.png"
   done
+  surface hare_layers_3 hare_surface
+  mv hare_layers_3_surface.png hare_layers_0_surface.png
+  surface hare_layers_3 hare_layers_3_surface
+  padding="" tiles figure_3_3.jpg 2x2 hare_layers_0_surface.png $files
+fi
+
+if picture figure_3_4 || picture figure_3_5; then
+  files= surfaces=
+  for b in 0 0.33 0.5 0.67 1 2; do
+    grow hare_billow_$b.vdb cloud $hare --surface hare_billow_${b}_surface.vdb --layers 3 --billow $b $layers
+    surface hare_billow_$b hare_billow_${b}_surface
+    figure hare_billow_$b --extinction 250
+    surfaces="$surfaces hare_billow_${b}_surface.png"
+    files="$files hare_billow_$b.png"
+  done
+  padding="" tiles figure_3_4.jpg 3x2 $surfaces
   padding="" tiles figure_3_5.jpg 3x2 $files
 fi
 
 if picture figure_3_7; then
   files=
   for a in 0 1 4 8; do
-    grow bunny_advect_$a.vdb cloud "$bunny" --layers 3 --billow 1 $layers --advect $a%
-    figure bunny_advect_$a --extinction 100
-    files="$files bunny_advect_$a.png"
+    grow hare_advect_$a.vdb cloud $hare --layers 3 --billow 1 $layers --advect $a%
+    figure hare_advect_$a --extinction 100
+    files="$files hare_advect_$a.png"
   done
   padding="" tiles figure_3_7.jpg 2x2 $files
+fi
+
+if picture figure_3_8; then
+  sed -n '/^cat >regions.toml/,/^END/p' "$docs/gallery.md" | sed '1d;$d' >regions.toml
+  grow regions.vdb cloud $hare --resolution 420 --seed 4 --recipe regions.toml
+  show regions regions.vdb --size 480x480 --view 20,5 --sun 100,30 --extinction 250 --backdrop
+  padding="" tiles figure_3_8.jpg 1x1 regions.png
+fi
+
+if picture cut; then
+  "$program" cut $hare --voronoi 12 --preview cut.png --quiet
+  oiiotool cut.png --resize 960x540 --quality 88 -o cut.jpg
+  keep cut.jpg
+  "$program" cut $hare --random-planes 4 --roughness 1.5% --seed 2 --preview stone.png --quiet
+  oiiotool stone.png --resize 960x540 --quality 88 -o tutorial_05_stone.jpg
+  keep tutorial_05_stone.jpg
+fi
+
+if picture transfer; then
+  view="--size 960x480 --quiet --texture $fish.png"
+  "$program" levelset $fish.obj -o fish.vdb --quiet
+  "$program" mesh fish.vdb -o fish_remesh.obj --faces 20000 --quiet
+  "$program" transfer --from $fish.obj --to fish_remesh.obj -o fish_remesh_uv.obj --preview transfer.png $view
+  keep transfer.png
+  "$program" transfer --from $fish.obj --to examples/whale.obj -o striped_whale.obj --quality best \
+    --bake-texture striped_whale.png --bake-size 1024x1024 --preview tutorial_06_whale.png $view
+  keep tutorial_06_whale.png
 fi

@@ -92,8 +92,8 @@ void growCloud(const CloudArguments& arguments, Run& run) {
 
 Verb cloudVerb() {
   return verbOf("cloud", "Grows a cumulus cloud on a mesh, a level set or a shape of its own.",
-                "nephele cloud bunny.obj -o bunny_cloud.vdb --resolution 512 --frequency 6x", addCloudOptions,
-                growCloud, fieldValueHelp(),
+                "nephele cloud examples/hare.obj -o hare_cloud.vdb --resolution 512 --frequency 6x",
+                addCloudOptions, growCloud, fieldValueHelp(),
                 [](const CloudArguments& arguments, Run& run) { return arguments.extent(run); });
 }
 

@@ -77,12 +77,13 @@ void cut(const CutArguments& arguments, Run& run) {
 }  // namespace
 
 Verb cutVerb() {
-  return verbOf("cut", "Cuts a model into closed pieces by knives.",
-                "nephele cut bunny.obj -o pieces --random-planes 5 --explode 0.4 --preview pieces.png",
-                addCutOptions, cut, {}, [](const CutArguments& arguments, Run& run) {
-                  const Box box = boxOf(arguments.readParts(run));
-                  return Extent{box, double(box.longestSide())};
-                });
+  return verbOf(
+      "cut", "Cuts a model into closed pieces by knives.",
+      "nephele cut examples/hare.obj -o pieces --random-planes 5 --explode 0.4 --preview pieces.png",
+      addCutOptions, cut, {}, [](const CutArguments& arguments, Run& run) {
+        const Box box = boxOf(arguments.readParts(run));
+        return Extent{box, double(box.longestSide())};
+      });
 }
 
 }  // namespace nephele::apps

@@ -73,7 +73,7 @@ void bindOptions(CLI::App& app, InfoOptions& options) {
 
 Verb infoVerb() {
   return verbOf("info", "Says what is in meshes, volumes and images, and what is wrong with them.",
-                "nephele info bunny.obj cloud.vdb picture.exr", bindOptions, describeFiles);
+                "nephele info examples/hare.obj examples/clownfish.png", bindOptions, describeFiles);
 }
 
 }  // namespace nephele::apps

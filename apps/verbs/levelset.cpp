@@ -74,8 +74,8 @@ void convert(const LevelsetArguments& options, Run& run) {
 
 Verb levelsetVerb() {
   return verbOf("levelset", "Turns closed meshes into a signed distance volume, and combines several.",
-                "nephele levelset bunny.obj -o bunny.vdb --resolution 512", addLevelsetOptions, convert, {},
-                [](const LevelsetArguments& options, Run&) { return options.extent(); });
+                "nephele levelset examples/hare.obj -o hare.vdb --resolution 512", addLevelsetOptions,
+                convert, {}, [](const LevelsetArguments& options, Run&) { return options.extent(); });
 }
 
 }  // namespace nephele::apps

@@ -90,7 +90,8 @@ void transfer(const TransferArguments& arguments, Run& run) {
 
 Verb transferVerb() {
   return verbOf("transfer", "Carries texture coordinates and other attributes from one mesh to another.",
-                "nephele transfer --from sphere.obj --to bunny.obj -o bunny_uv.obj --preview bunny.png",
+                "nephele transfer --from examples/clownfish.obj --to examples/whale.obj -o whale_uv.obj "
+                "--preview whale.png",
                 addTransferOptions, transfer, {},
                 [](const TransferArguments& arguments, Run&) { return extentOfFile(arguments.to); });
 }

@@ -59,7 +59,7 @@ void transform(const TransformOptions& options, Run& run) {
 
 Verb transformVerb() {
   return verbOf("transform", "Moves, turns and scales a mesh or a volume; changes its up axis or unit.",
-                "nephele transform scan.ply -o scan.obj --up-axis z --unit mm --place ground",
+                "nephele transform examples/hare.obj -o hare.obj --to-up-axis z --to-unit mm --place ground",
                 addTransformOptions, transform, {}, extentOfTurned);
 }
 

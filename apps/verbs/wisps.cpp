@@ -71,8 +71,8 @@ void makeWisps(const WispsArguments& arguments, Run& run) {
 
 Verb wispsVerb() {
   return verbOf("wisps", "Grows wisps of fine dots on guide particles.",
-                "nephele wisps particles.ply -o wisps.vdb --wisp-size 5% --dots 50000", addWispsOptions,
-                makeWisps, {}, extentOfWisps);
+                "nephele wisps examples/hare.obj -o hare.vdb --guides 60 --wisp-size 5% --dots 50000",
+                addWispsOptions, makeWisps, {}, extentOfWisps);
 }
 
 }  // namespace nephele::apps

@@ -58,8 +58,8 @@ double hareEar(const Vec3d& p, const Vec3d& root, const Vec3d& along, const Vec3
 
 double hare(const Vec3d& p) {
   double all = blended(hareBody(p), hareHead(p), 0.10);
-  all = blended(all, hareEar(p, {0.33, 1.40, 0.085}, {-0.42, 1, 0.20}, {0.5, 0, 1}), 0.05);
-  all = blended(all, hareEar(p, {0.33, 1.40, -0.085}, {-0.08, 1, -0.26}, {0.75, 0, -1}), 0.05);
+  all = blended(all, hareEar(p, {0.33, 1.40, 0.085}, {-0.66, 1, 0.20}, {0.5, 0, 1}), 0.05);
+  all = blended(all, hareEar(p, {0.33, 1.40, -0.085}, {0.02, 1, -0.24}, {0.75, 0, -1}), 0.05);
   // Flat where it sits.
   return -blended(-all, -p.y, 0.03);
 }
