@@ -13,8 +13,8 @@
 #include <future>
 
 #include "apps/detail/turntable_plan.h"
-#include "apps/options/live_picture.h"
-#include "apps/options/picture_files.h"
+#include "apps/options/picture/live_picture.h"
+#include "apps/options/picture/picture_files.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/contact_sheet.h"
 #include "nephele/render/image/deep_image.h"

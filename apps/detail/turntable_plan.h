@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/options/scene_options.h"
+#include "apps/options/picture/scene_options.h"
 #include "nephele/render/image/frame_range.h"
 #include "nephele/render/image/movie.h"
 #include "nephele/render/scene/turntable.h"

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "apps/options/colour_options.h"
 #include "apps/options/mesh_options.h"
+#include "apps/options/picture/colour_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/render/preview/surface_picture.h"

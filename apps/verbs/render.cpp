@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
-#include "apps/options/live_picture.h"
-#include "apps/options/picture_files.h"
-#include "apps/options/render_options.h"
-#include "apps/options/scene_options.h"
-#include "apps/options/shapes_picture.h"
+#include "apps/options/picture/live_picture.h"
+#include "apps/options/picture/render_options.h"
+#include "apps/options/picture/scene_options.h"
+#include "apps/options/picture/shapes_picture.h"
+#include "apps/options/picture/picture_files.h"
 
 namespace nephele::apps {
 namespace {

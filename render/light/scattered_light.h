@@ -10,6 +10,7 @@
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/light/phase_expansion.h"
+#include "nephele/render/light/viewpoint.h"
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele {
@@ -48,11 +49,6 @@ struct ScatteredSource {
   static ScatteredSource of(const LightVolume& sun, const Vec3f& towards);
   /// A sky of radiance 1.
   static ScatteredSource evenSky();
-};
-
-/// From where a volume is looked at: a place, or the way of all rays.
-struct Viewpoint {
-  std::optional<Vec3f> place, forward;
 };
 
 /// Light in a volume by discrete ordinates, as moments over all directions, on a coarse lattice.

@@ -1,4 +1,4 @@
-#include "apps/options/shapes_picture.h"
+#include "apps/options/picture/shapes_picture.h"
 
 #include <fmt/format.h>
 

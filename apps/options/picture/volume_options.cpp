@@ -1,4 +1,4 @@
-#include "apps/options/volume_options.h"
+#include "apps/options/picture/volume_options.h"
 
 #include <fmt/format.h>
 

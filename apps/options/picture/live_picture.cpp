@@ -1,4 +1,4 @@
-#include "apps/options/live_picture.h"
+#include "apps/options/picture/live_picture.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "apps/options/light_options.h"
+#include "apps/options/picture/light_options.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "apps/options/colour_options.h"
+#include "apps/options/picture/colour_options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/light/deep_shadow.h"
 

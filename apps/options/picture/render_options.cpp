@@ -1,11 +1,11 @@
-#include "apps/options/render_options.h"
+#include "apps/options/picture/render_options.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "apps/options/live_picture.h"
+#include "apps/options/picture/live_picture.h"
 #include "nephele/render/march/film.h"
 #include "nephele/render/scene/aerial_perspective.h"
 #include "nephele/render/scene/backdrop.h"

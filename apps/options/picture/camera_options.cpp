@@ -1,4 +1,4 @@
-#include "apps/options/camera_options.h"
+#include "apps/options/picture/camera_options.h"
 
 #include <fmt/format.h>
 

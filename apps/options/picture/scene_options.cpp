@@ -1,8 +1,8 @@
-#include "apps/options/scene_options.h"
+#include "apps/options/picture/scene_options.h"
 
 #include <fmt/format.h>
 
-#include "apps/options/shapes_picture.h"
+#include "apps/options/picture/shapes_picture.h"
 
 namespace nephele::apps {
 

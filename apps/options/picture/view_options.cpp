@@ -1,4 +1,4 @@
-#include "apps/options/view_options.h"
+#include "apps/options/picture/view_options.h"
 
 #include <array>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/app.h"
-#include "apps/options/render_options.h"
+#include "apps/options/picture/render_options.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/scene/surfaces.h"
 #include "nephele/render/volume/render_volume.h"

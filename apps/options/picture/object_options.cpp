@@ -1,10 +1,10 @@
-#include "apps/options/object_options.h"
+#include "apps/options/picture/object_options.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "apps/options/colour_options.h"
+#include "apps/options/picture/colour_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"

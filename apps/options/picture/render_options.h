@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "apps/app.h"
-#include "apps/options/camera_options.h"
-#include "apps/options/light_options.h"
-#include "apps/options/quality_options.h"
-#include "apps/options/scale_options.h"
-#include "apps/options/view_options.h"
-#include "apps/options/volume_options.h"
+#include "apps/options/picture/camera_options.h"
+#include "apps/options/picture/light_options.h"
+#include "apps/options/picture/quality_options.h"
+#include "apps/options/picture/scale_options.h"
+#include "apps/options/picture/view_options.h"
+#include "apps/options/picture/volume_options.h"
 #include "nephele/render/image/display_server.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/options/object_options.h"
-#include "apps/options/render_options.h"
+#include "apps/options/picture/object_options.h"
+#include "apps/options/picture/render_options.h"
 
 namespace nephele::apps {
 

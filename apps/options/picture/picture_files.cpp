@@ -1,4 +1,4 @@
-#include "apps/options/picture_files.h"
+#include "apps/options/picture/picture_files.h"
 
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/render/image/exr_io.h"

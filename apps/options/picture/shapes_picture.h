@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/options/object_options.h"
-#include "apps/options/picture_files.h"
+#include "apps/options/picture/object_options.h"
+#include "apps/options/picture/picture_files.h"
 
 namespace nephele::apps {
 

@@ -1,4 +1,4 @@
-#include "apps/options/scale_options.h"
+#include "apps/options/picture/scale_options.h"
 
 #include <fmt/format.h>
 
