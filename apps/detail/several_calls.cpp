@@ -11,7 +11,7 @@ namespace nephele::apps {
 namespace {
 
 /// Options by which a call is not what it makes.
-constexpr std::string_view kOthers[]{"frames", "only", "shard"};
+constexpr std::string_view kNotOfCalls[]{"frames", "only", "shard"};
 
 /// Of all inputs together; nothing where the verb chooses nothing by them.
 std::optional<Extent> measured(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
@@ -88,7 +88,7 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       run.part->range = range;
       run.beginPart(call.name, 0.05 + share * double(i), 0.05 + share * double(i + 1));
       run.part->digest =
-          optionsDigest(command.app, kOthers,
+          optionsDigest(command.app, kNotOfCalls,
                         fmt::format("{} {}", call.part.framesSinceFirst, range ? textOf(*range) : ""));
       const bool skips = calls.skipExisting && isThere(command, run.part->digest, run);
       skipped += skips;

@@ -34,8 +34,8 @@ std::optional<FramePattern> patternOf(const std::string& option, const std::stri
 }
 
 // What the linear pixels of a frame do not depend on, or only by its number.
-constexpr std::string_view kOthers[]{"frames",         "fps",         "only",      "shard", "exposure",
-                                     "view-transform", "ocio-config", "background"};
+constexpr std::string_view kNotOfPictures[]{"frames",         "fps",         "only",      "shard", "exposure",
+                                            "view-transform", "ocio-config", "background"};
 
 // Why `path` is not a whole picture of the `window` of `camera`; "" if it is. Pictures for the screen say
 // nothing of what they are made of.
@@ -66,7 +66,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
-  digest = optionsDigest(*options.app, kOthers, fmt::format("{}-{}", first, last));
+  digest = optionsDigest(*options.app, kNotOfPictures, fmt::format("{}-{}", first, last));
   const auto output = patternOf("--output", options.output),
              preview = patternOf("--preview", options.preview);
   for (const auto& [name, path] :

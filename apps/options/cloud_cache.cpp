@@ -9,7 +9,7 @@ namespace nephele::apps {
 namespace {
 
 /// What the levels of a cloud do not depend on, or only by the shape, the voxels and the reach of the edge.
-constexpr std::string_view kOthers[]{
+constexpr std::string_view kNotOfLayers[]{
     "input",      "species",          "shape-seed",     "shape-size", "repair",         "subdivide",
     "resolution", "voxel-size",       "half",           "density",    "edge-thickness", "edge-falloff",
     "flat-base",  "interior-noise",   "height-profile", "thin-out",   "advect",         "advect-steps",
@@ -32,7 +32,7 @@ std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const Clou
   const bool isMoving = arguments.noiseTime || !arguments.recipe.empty();
   const float edge = options.edgeThickness.range(Box::everywhere()).max;
   return optionsDigest(
-      *arguments.cache.app, kOthers,
+      *arguments.cache.app, kNotOfLayers,
       fmt::format("{} {} {} {} {}", hash.text(), options.voxelSize, cloudEdgeReach(edge, options.voxelSize),
                   run.longestSide(boundingBox(shape)),
                   run.part && isMoving ? run.part->framesSinceFirst : 0));
