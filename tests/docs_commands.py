@@ -18,18 +18,19 @@ ROOT = Path(__file__).resolve().parent.parent
 NOT_RUN = re.compile(r"<!-- not run: \S.*-->")
 
 # Counts are at most these; where they are not given, these are added.
-LARGEST = {"--resolution": 40, "--dots": 2000, "--guides": 12, "--samples": 2, "--layers": 2, "--faces": 3000, "--iterations": 2,
+LARGEST = {"--resolution": 40, "--dots": 2000, "--guides": 12, "--samples": 2, "--layers": 1, "--faces": 3000, "--iterations": 2,
            "--bake-samples": 1}
 ADDED = {
-    "cloud": {"--resolution": "40", "--layers": "2"},
+    "cloud": {"--resolution": "40", "--layers": "1"},
     "levelset": {"--resolution": "40"},
     "wisps": {"--resolution": "40", "--dots": "2000"},
     "cut": {"--size": "64x48"},
-    "transfer": {"--resolution": "40", "--size": "64x32"},
+    "transfer": {"--resolution": "40", "--size": "64x32", "--quality": "fast"},
     "render": {"--size": "64x36", "--quality": "draft"},
     "turntable": {"--size": "64x36", "--quality": "draft"},
 }
-NEEDS_PREVIEW = {"cut": "--size", "transfer": "--size"}
+# Without a picture these verbs refuse a size.
+MAY_HAVE_PICTURE = ("cut", "transfer")
 # Where the second is given, the first is not added.
 OTHERS = {"--resolution": "--voxel-size"}
 
@@ -102,7 +103,7 @@ def small_arguments(arguments):
     for option, value in ADDED.get(verb, {}).items():
         if option in given or OTHERS.get(option) in given:
             continue
-        if NEEDS_PREVIEW.get(verb) == option and "--preview" not in given:
+        if option == "--size" and verb in MAY_HAVE_PICTURE and not given & {"--preview", "--contact-sheet"}:
             continue
         small += [option, value]
     return small
