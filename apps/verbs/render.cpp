@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
 #include "apps/options/picture/live_picture.h"
+#include "apps/options/picture/picture_files.h"
 #include "apps/options/picture/render_options.h"
 #include "apps/options/picture/scene_options.h"
 #include "apps/options/picture/shapes_picture.h"
-#include "apps/options/picture/picture_files.h"
 
 namespace nephele::apps {
 namespace {
