@@ -166,8 +166,8 @@ struct Seen {
   bool isGround = false;
 };
 
-// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray; no farther than `most` and through the
-// ground, if that is given.
+// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray; no farther than `most` and through
+// the ground, if that is given.
 template <std::size_t kKinds, class Sources>
 Seen<kKinds> lookAlong(const Atmosphere& atmosphere, double radius, double rise, int steps,
                        const Sources& sourcesAt, double most = std::numeric_limits<double>::infinity()) {

@@ -206,8 +206,7 @@ VoxelGrid<float> toVoxels(const BrickGrid& bricks) {
         std::array<float, kBrickSamples> own;
         auto to = own.begin();
         for (int k = 0; k < kBrickSide; ++k)
-          for (int j = 0; j < kBrickSide; ++j)
-            to = std::copy_n(from + sampleOffset(0, j, k), kBrickSide, to);
+          for (int j = 0; j < kBrickSide; ++j) to = std::copy_n(from + sampleOffset(0, j, k), kBrickSide, to);
         // Some bricks are there for their neighbours' borders.
         if (std::ranges::any_of(own, [&](float value) { return value != bricks.background(); }))
           std::ranges::copy(own, grid.add(brick));

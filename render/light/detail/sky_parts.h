@@ -16,9 +16,9 @@ struct SkyParts {
   std::vector<Vec3f> colours;
 };
 
-/// The fewest parts that give the mean of every colour, and its radiance to 2.5 % of that, root mean square over
-/// the directions; three give it exactly. Skies are mostly two: what is blue above and what is pale about the
-/// horizon.
+/// The fewest parts that give the mean of every colour, and its radiance to 2.5 % of that, root mean square
+/// over the directions; three give it exactly. Skies are mostly two: what is blue above and what is pale
+/// about the horizon.
 ///
 /// By the largest eigenvectors of the colours' second moments, which leave the least (principal components).
 SkyParts partsOfSky(std::span<const Vec3f> radiance);
