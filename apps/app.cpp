@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-// All of CLI11 here alone: the others take CLI/App.hpp, or each would compile its formatter and its reader of
-// configuration files again.
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <iostream>
 #include <new>

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+// All of CLI11 here alone: the others take CLI/App.hpp, or each would compile its formatter and its reader of
+// configuration files again.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "apps/looks.h"
