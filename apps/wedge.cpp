@@ -184,12 +184,13 @@ std::string Wedge::fileName(const std::string& path, std::size_t index) const {
   if (FramePattern::places(path) == 1) return FramePattern::parse(path).path(int(index) + 1);
   std::string values;
   for (std::size_t axis = 0; axis != axes_.size(); ++axis) {
-    std::string name = inFileName(valueOf(axis, index));
+    const std::string own = inFileName(valueOf(axis, index));
+    std::string name = own;
     // Values that differ only in other signs.
     for (const std::string& other : axes_[axis].values)
       if (&other == &valueOf(axis, index))
         break;
-      else if (inFileName(other) == name)
+      else if (inFileName(other) == own)
         name += "_";
     values += fmt::format(".{}_{}", axes_[axis].option, name);
   }

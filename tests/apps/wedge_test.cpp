@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "nephele/levelset/io/vdb_io.h"
@@ -78,6 +79,19 @@ TEST_F(Wedges, TakeRangesListsVectorsWordsAndFlags) {
   EXPECT_EQ(names("step=5%,10%"), (Names{"step 5%", "step 10%"}));
   EXPECT_TRUE(fs::exists(file("r.step_5.exr")));
   EXPECT_EQ(names("look=sunset,storm"), (Names{"look sunset", "look storm"}));
+}
+
+TEST_F(Wedges, OfValuesThatDifferOnlyInSignsHaveNamesOfTheirOwn) {
+  std::string values;
+  for (const char* name : {"a b.toml", "a,b.toml", "a_b.toml"}) {
+    std::ofstream(file(name)) << "[[layer]]\n";
+    values += (values.empty() ? "" : ";") + file(name);
+  }
+  succeeds(cloud("--wedge 'recipe=" + values + "'"));
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(file("c.vdb")).parent_path()))
+    count += entry.path().filename().string().starts_with("c.recipe_");
+  EXPECT_EQ(count, 3);
 }
 
 TEST_F(Wedges, OfTwoOptionsMakeATable) {
