@@ -21,6 +21,13 @@ std::string printable(std::string_view text, std::size_t most) {
   return result;
 }
 
+std::string quoted(std::string_view text, std::size_t most) {
+  std::string result = "'";
+  result += printable(text, most);
+  result += '\'';
+  return result;
+}
+
 bool isUtf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto first = static_cast<unsigned char>(text[i]);

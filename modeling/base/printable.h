@@ -10,6 +10,9 @@ namespace nephele {
 /// characters, the last of which are dots then. Letters of any encoding stay.
 std::string printable(std::string_view text, std::size_t most = std::string_view::npos);
 
+/// The same between single quotes.
+std::string quoted(std::string_view text, std::size_t most = std::string_view::npos);
+
 /// Whether `text` is whole characters in UTF-8: none in a longer form than it needs, no surrogates.
 bool isUtf8(std::string_view text);
 
