@@ -12,6 +12,7 @@ modeling/field    modeling/base
 modeling/noise    modeling/base modeling/field
 modeling/shape    modeling/base modeling/field modeling/noise
 modeling/cloud    modeling/base modeling/field modeling/noise modeling/shape
+modeling/felt     modeling/base modeling/field modeling/noise modeling/shape modeling/cloud
 levelset/grid     modeling
 levelset/mesh     modeling levelset/grid
 levelset/io       modeling levelset/grid levelset/mesh
@@ -19,12 +20,14 @@ levelset/cloud    modeling levelset/grid levelset/mesh levelset/io
 levelset/flow     modeling levelset/grid levelset/mesh levelset/io
 levelset/cut      modeling levelset/grid levelset/mesh levelset/io
 levelset/warp     modeling levelset/grid levelset/mesh levelset/io
+levelset/felt     modeling levelset
 render/image      modeling levelset
 render/scene      modeling levelset render/image
 render/volume     modeling levelset render/image render/scene
 render/light      modeling levelset render/image render/scene render/volume
 render/march      modeling levelset render/image render/scene render/volume render/light
 render/preview    modeling levelset render/image render/scene render/volume render/light render/march
+render/felt       modeling levelset render
 '
 
 grep -rn --include='*.h' --include='*.cpp' '^ *#include *"' modeling levelset render apps tests |
