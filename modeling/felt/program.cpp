@@ -8,6 +8,7 @@
 #include "nephele/modeling/base/text_file.h"
 #include "nephele/modeling/felt/detail/checker.h"
 #include "nephele/modeling/felt/detail/interpreter.h"
+#include "nephele/modeling/felt/detail/parser.h"
 
 namespace nephele::felt {
 
@@ -178,7 +179,7 @@ ExpressionPtr Program::Parts::set(Interpreter& interpreter, Checker& scope, Sour
       list += (list.empty() ? "" : ", ") + known.name;
     }
     const std::string near = nearestName(name, names);
-    throw Error("--set " + printable(name, 60) + ": " + sources[0].name() + " has no such parameter; " +
+    throw Error("setting " + quoted(name, 60) + ": " + sources[0].name() + " has no such parameter; " +
                 (!near.empty()  ? "did you mean " + near + "?"
                  : list.empty() ? "it declares none"
                                 : "it has " + list));
@@ -187,7 +188,7 @@ ExpressionPtr Program::Parts::set(Interpreter& interpreter, Checker& scope, Sour
   const Type type = parameter->declared.type;
   // Words of a choice need no quotes on a command line.
   const bool isWord = type == Type{Kind::text} && !text.starts_with("\"");
-  const int file = all.add("--set " + name, text);
+  const int file = all.add("setting " + name, text);
   ExpressionPtr expression;
   if (isWord) {
     expression = std::make_unique<Expression>();

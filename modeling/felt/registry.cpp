@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/felt/detail/syntax.h"
+#include "nephele/modeling/felt/detail/parser.h"
 
 namespace nephele::felt {
 

@@ -58,7 +58,7 @@ std::string joined(Context& context, const std::string& a, const std::string& b)
   if (static_cast<Integer>(a.size() + b.size()) > context.limits.elements)
     throw CallError(Code::limit,
                     "a string of more than " + std::to_string(context.limits.elements) + " characters",
-                    "--max-elements allows more");
+                    "the limit max-elements allows more");
   return a + b;
 }
 

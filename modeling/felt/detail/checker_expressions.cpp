@@ -85,7 +85,10 @@ ExpressionPtr literalOf(const Span& span, Value value, const Type& type) {
 }  // namespace
 
 bool Checker::expression(ExpressionPtr& expression, const Type& wanted) {
-  if (typed(expression, wanted)) return true;
+  // Parts of what has become a call are looked at twice.
+  const bool isChecked = expression->type.kind != Kind::nothing || expression->function != nullptr ||
+                         expression->declaration != nullptr;
+  if (isChecked || typed(expression, wanted)) return true;
   expression->type = {};
   return false;
 }

@@ -35,8 +35,18 @@ bool ExpressionParser::accept(std::string_view mark) {
 }
 
 void ExpressionParser::fault(Code code, const Span& span, std::string message, std::string hint) {
-  diagnostics_.push_back({code, span, std::move(message), std::move(hint)});
+  if (code != Code::expected || !isUnreadableLine(span))
+    diagnostics_.push_back({code, span, std::move(message), std::move(hint)});
   throw Unreadable();
+}
+
+bool ExpressionParser::isUnreadableLine(const Span& span) const {
+  const Source& source = sources_[span.file];
+  for (std::size_t i = 0; i < tokenFaults_; ++i)
+    if (const Span& fault = diagnostics_[firstFault_ + i].span;
+        fault.file == span.file && source.lineStart(fault.begin) == source.lineStart(span.begin))
+      return true;
+  return false;
 }
 
 std::string ExpressionParser::written(const Token& token) {
@@ -67,9 +77,10 @@ void ExpressionParser::expect(std::string_view mark, const std::string& where) {
   const Source& source = sources_[last_.file];
   const bool goesOn = here().kind != TokenKind::end &&
                       source.placeOf(here().span.begin).line > source.placeOf(last_.end - 1).line;
-  diagnostics_.push_back({Code::expected,
-                          {last_.file, last_.end, last_.end},
-                          "expected ';' before " + (goesOn ? "the end of the line" : written(here()))});
+  const Span place{last_.file, last_.end, last_.end};
+  if (!isUnreadableLine(place))
+    diagnostics_.push_back(
+        {Code::expected, place, "expected ';' before " + (goesOn ? "the end of the line" : written(here()))});
   if (!goesOn) throw Unreadable();
 }
 
@@ -113,6 +124,21 @@ ExpressionPtr ExpressionParser::operation(const Token& mark, const std::string& 
   adopt(*result, std::move(a));
   adopt(*result, std::move(b));
   return result;
+}
+
+ExpressionPtr ExpressionParser::copyOf(const Expression& from) {
+  auto copy = std::make_unique<Expression>();
+  copy->kind = from.kind;
+  copy->span = from.span;
+  copy->name = from.name;
+  copy->nameSpan = from.nameSpan;
+  copy->literal = from.literal;
+  copy->type = from.type;
+  copy->partNames = from.partNames;
+  copy->partNameSpans = from.partNameSpans;
+  copy->height = from.height;
+  for (const ExpressionPtr& part : from.parts) copy->parts.push_back(copyOf(*part));
+  return copy;
 }
 
 ExpressionPtr ExpressionParser::expression() {

@@ -16,7 +16,11 @@ struct Unreadable {};
 class ExpressionParser {
  public:
   ExpressionParser(const Sources& sources, int file, std::vector<Diagnostic>& diagnostics)
-      : sources_(sources), tokens_(tokensOf(sources, file, diagnostics).tokens), diagnostics_(diagnostics) {}
+      : sources_(sources),
+        firstFault_(diagnostics.size()),
+        tokens_(tokensOf(sources, file, diagnostics).tokens),
+        tokenFaults_(diagnostics.size() - firstFault_),
+        diagnostics_(diagnostics) {}
 
   ExpressionPtr expression();
 
@@ -44,6 +48,7 @@ class ExpressionParser {
   std::optional<Kind> kindHere() const;
   ExpressionPtr node(ExpressionKind kind, const Span& span, std::string name = {});
   void adopt(Expression& parent, ExpressionPtr part);
+  static ExpressionPtr copyOf(const Expression& from);
   ExpressionPtr operation(const Token& mark, const std::string& name, ExpressionPtr a, ExpressionPtr b);
   /// Operators of `kLevels[level]` and tighter.
   ExpressionPtr binary(std::size_t level);
@@ -57,8 +62,13 @@ class ExpressionParser {
   ExpressionPtr bracketed();
   ExpressionPtr array();
 
+  /// Whether something in the line is no token at all, which has been told and explains the rest.
+  bool isUnreadableLine(const Span& span) const;
+
   const Sources& sources_;
+  std::size_t firstFault_;
   std::vector<Token> tokens_;
+  std::size_t tokenFaults_;
   std::vector<Diagnostic>& diagnostics_;
   std::size_t place_ = 0;
   int depth_ = 0;

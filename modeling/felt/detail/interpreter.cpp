@@ -72,7 +72,7 @@ void Interpreter::countStatement(const Span& span) {
   if (++statements_ > context_.limits.statements)
     fail(Code::limit, span,
          "the script has carried out " + std::to_string(context_.limits.statements) + " statements",
-         "is there a loop without end? --max-statements allows more");
+         "is there a loop without end? the limit max-statements allows more");
   if (statements_ % 256 == 0) context_.progress->check();
 }
 
@@ -184,7 +184,7 @@ void Interpreter::assignment(const Statement& statement) {
     fail(Code::limit, target.span,
          "'" + name.name + "' has " + std::to_string(context_.limits.elements) +
              " elements, the most that an array may have",
-         "--max-elements allows more");
+         "the limit max-elements allows more");
   // Nobody else holds the array that is written most of the time, so that growing it stays linear.
   auto held = array.isSet() ? std::const_pointer_cast<std::vector<Value>>(array.as<Array>())
                             : std::make_shared<std::vector<Value>>();
@@ -303,7 +303,7 @@ Value Interpreter::callBuiltIn(const Expression& call) {
     if (result.depth > context_.limits.depth)
       fail(Code::limit, call.span,
            "a field of more than " + std::to_string(context_.limits.depth) + " operations in each other",
-           "sample it into a cache, or --max-depth allows more");
+           "sample it into a cache, or the limit max-depth allows more");
     if (keepsParts_ && made_.find(node) == made_.end()) {
       Made entry{result, {}};
       for (const Value& argument : arguments)
@@ -318,7 +318,7 @@ Value Interpreter::callOwn(const Expression& call) {
   const FunctionDeclaration& function = *call.declaration;
   if (calls_ >= context_.limits.calls)
     fail(Code::limit, call.span, std::to_string(calls_) + " calls are under way at the same time",
-         "does '" + function.name + "' call itself for ever? --max-calls allows more");
+         "does '" + function.name + "' call itself for ever? the limit max-calls allows more");
   std::vector<Value> arguments;
   for (std::size_t i = 0; i < function.parameters.size(); ++i)
     arguments.push_back(evaluate(call.parts[i] ? *call.parts[i] : *function.parameters[i].value));

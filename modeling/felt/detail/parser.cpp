@@ -1,3 +1,5 @@
+#include "nephele/modeling/felt/detail/parser.h"
+
 #include <algorithm>
 
 #include "nephele/modeling/base/printable.h"
@@ -58,7 +60,6 @@ class Parser : public ExpressionParser {
   [[noreturn]] void unknownType();
   StatementPtr stepped(const Span& begin, ExpressionPtr target, const Token& mark);
   StatementPtr assigned(const Span& begin, ExpressionPtr target, ExpressionPtr value);
-  static ExpressionPtr copyOf(const Expression& from);
   Type type(bool mayBeNothing);
   StatementPtr declaration(const Span& begin);
   /// Name, parameters in brackets.
@@ -277,21 +278,6 @@ StatementPtr Parser::assigned(const Span& begin, ExpressionPtr target, Expressio
   result->expressions.push_back(std::move(target));
   result->expressions.push_back(std::move(value));
   return finished(std::move(result));
-}
-
-ExpressionPtr Parser::copyOf(const Expression& from) {
-  auto copy = std::make_unique<Expression>();
-  copy->kind = from.kind;
-  copy->span = from.span;
-  copy->name = from.name;
-  copy->nameSpan = from.nameSpan;
-  copy->literal = from.literal;
-  copy->type = from.type;
-  copy->partNames = from.partNames;
-  copy->partNameSpans = from.partNameSpans;
-  copy->height = from.height;
-  for (const ExpressionPtr& part : from.parts) copy->parts.push_back(copyOf(*part));
-  return copy;
 }
 
 Type Parser::type(bool mayBeNothing) {
