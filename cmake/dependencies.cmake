@@ -23,6 +23,12 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
     find_package(embree 3 REQUIRED)
   endif()
 
+  if(NEPHELE_WITH_FFTW)
+    # Debian's has no CMake configuration of single precision.
+    find_path(FFTW_INCLUDE_DIR fftw3.h REQUIRED)
+    find_library(FFTW_LIBRARY fftw3f REQUIRED)
+  endif()
+
   # Debian's OpenVDB installs its find module, but not on CMake's path.
   list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
   # It sets this variable unless CGAL was found before.

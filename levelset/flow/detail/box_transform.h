@@ -1,0 +1,103 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+
+#include "nephele/modeling/base/math.h"
+
+/// Sums of waves along the axes of a box, in place. For the projection of flows.
+namespace nephele::detail {
+
+/// The functions of j that a row of n numbers is a sum of. Forward and back again is `kind` times n.
+enum class Waves {
+  /// e^(2 pi i k j / n). Along x, where numbers are real, those with k from 0 to n / 2; twice 1 times n.
+  exponentials,
+  /// cos(pi k (j + 1/2) / n), k from 0 to n - 1; 2 n.
+  cosines,
+  /// sin(pi k (j + 1/2) / n), k from 0, which is 0, to n - 1; 2 n. The wave k = n, which alternates, is
+  /// dropped.
+  sines,
+};
+
+enum class Direction { forward, inverse };
+
+/// Columns that are transformed together, side by side: numbers of one block lie kBlock apart.
+inline constexpr std::size_t kBlock = 16;
+
+/// Transforms one row or one block of columns.
+class LineTransform {
+ public:
+  enum class Layout {
+    /// n reals, to n / 2 + 1 complex numbers where waves are exponentials.
+    row,
+    /// n times kBlock reals, or kBlock / 2 complex numbers where waves are exponentials.
+    block,
+  };
+
+  LineTransform(int n, Waves waves, Direction direction, Layout layout);
+  ~LineTransform();
+  LineTransform(LineTransform&&) noexcept;
+
+  /// `values` lies at a multiple of kAlignment bytes. May be called from several threads at once.
+  void run(float* values) const;
+
+ private:
+  struct Plan;
+  std::unique_ptr<Plan> plan_;
+};
+
+inline constexpr std::size_t kAlignment = 64;
+
+/// Numbers at a multiple of kAlignment bytes, not set.
+struct AlignedFree {
+  void operator()(float* values) const;
+};
+using AlignedFloats = std::unique_ptr<float[], AlignedFree>;
+AlignedFloats alignedFloats(std::size_t count);
+
+/// A box of numbers, rows along x padded so that each begins at a multiple of kAlignment bytes.
+class BoxValues {
+ public:
+  /// `count` numbers along each axis, and room for the complex numbers that rows become.
+  explicit BoxValues(const Vec3i& count);
+
+  const Vec3i& count() const { return count_; }
+  /// Numbers from row to row, a multiple of kBlock, and from plane to plane.
+  std::size_t rowLength() const { return rowLength_; }
+  std::size_t planeLength() const { return rowLength_ * std::size_t(count_.y); }
+  float* row(int y, int z) const {
+    return values_.get() + std::size_t(z) * planeLength() + std::size_t(y) * rowLength_;
+  }
+
+ private:
+  Vec3i count_;
+  std::size_t rowLength_;
+  AlignedFloats values_;
+};
+
+/// The transforms of a box, axis by axis.
+class BoxTransform {
+ public:
+  BoxTransform(const Vec3i& count, const std::array<Waves, 3>& waves);
+
+  /// Along x and then y, or the other way round, of one plane of `values`. From several threads at once for
+  /// different planes.
+  void forwardInPlane(const BoxValues& values, int z) const;
+  void inverseInPlane(const BoxValues& values, int z) const;
+  /// Along z, of a block of columns.
+  const LineTransform& forwardAlongZ() const { return lines_[2]; }
+  const LineTransform& inverseAlongZ() const { return lines_[5]; }
+
+ private:
+  void alongY(const LineTransform& line, const BoxValues& values, int z) const;
+
+  /// Forward along x, y, z, then inverse.
+  std::array<LineTransform, 6> lines_;
+};
+
+/// Copies a block of `count` numbers per column from or to places `stride` apart.
+void gather(const float* from, std::size_t stride, int count, float* block);
+void scatter(const float* block, int count, float* to, std::size_t stride);
+
+}  // namespace nephele::detail
