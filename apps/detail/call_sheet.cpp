@@ -26,7 +26,7 @@ class ScratchFolder {
  public:
   explicit ScratchFolder(const std::string& beside) {
     const fs::path folder = fs::path(beside).parent_path();
-    path_ = (folder / ".nephele_sheet_XXXXXX").string();
+    path_ = (folder / (".nephele_sheet_" + std::string(6, 'X'))).string();
     require(mkdtemp(path_.data()) != nullptr,
             fmt::format("cannot write {}: no folder can be made there", beside));
     open_.emplace(path_);

@@ -7,10 +7,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/printable.h"
+#include "nephele/render/image/detail/config_check.h"
 
 namespace nephele {
 namespace {
@@ -28,6 +31,15 @@ class Silence {
  private:
   OCIO::LoggingLevel before_;
 };
+
+// What OpenColorIO says, on one line and without the words of the libraries that it reads with.
+std::string reasonOf(const std::string& path, std::string message) {
+  std::ranges::replace(message, '\n', ' ');
+  for (const std::string& words :
+       {fmt::format("Error: Loading the OCIO profile '{}' failed. ", path), std::string("yaml-cpp: ")})
+    if (const std::size_t at = message.find(words); at != message.npos) message.erase(at, words.size());
+  return message == "stoi" ? "ocio_profile_version is no number" : message;
+}
 
 using Views = std::vector<std::pair<std::string, std::string>>;
 
@@ -117,7 +129,10 @@ std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const 
     require(std::filesystem::is_regular_file(path, error), "is no file that can be read");
     require(std::filesystem::file_size(path, error) <= kMostBytes,
             "is too large for an OpenColorIO configuration");
+    std::ifstream file(path, std::ios::binary);
+    detail::checkConfigText({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
     const OCIO::ConstConfigRcPtr config = OCIO::Config::CreateFromFile(path.c_str());
+    detail::checkVariables(config);
     const auto [display, name] = chosen(config, view);
     const auto [steps, space] = entrance(config);
     const auto shown = OCIO::DisplayViewTransform::Create();
@@ -125,6 +140,7 @@ std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const 
     shown->setDisplay(display.c_str());
     shown->setView(name.c_str());
     steps->appendTransform(shown);
+    detail::checkTransform(config, steps);
     const OCIO::ConstCPUProcessorRcPtr processor =
         config->getProcessor(steps, OCIO::TRANSFORM_DIR_FORWARD)->getDefaultCPUProcessor();
     const auto apply = [processor](std::span<float> rgb) {
@@ -133,9 +149,8 @@ std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const 
     };
     return std::make_shared<ConfigView>(ConfigView{display + "/" + name, apply});
   } catch (const OCIO::Exception& error) {
-    std::string reason = error.what();
-    std::ranges::replace(reason, '\n', ' ');
-    throw Error(fmt::format("{}: cannot be used as an OpenColorIO configuration: {}", path, reason));
+    throw Error(fmt::format("{}: cannot be used as an OpenColorIO configuration: {}", path,
+                            reasonOf(path, error.what())));
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", path, error.what()));
   }

@@ -108,6 +108,10 @@ TEST_F(Views, OfMeshesAloneAreStandardUnlessAskedFor) {
 TEST_F(Views, ThatAreNotThereAreRefusedBeforeAnythingIsRead) {
   if (const std::string missing = whatIsMissing(); !missing.empty()) GTEST_SKIP() << missing;
   std::ofstream(folder_.file("broken.ocio")) << "displays: [\n";
+  std::string circle = textOf(config());
+  circle.replace(circle.find("!<FileTransform>"), circle.npos,
+                 "!<ColorSpaceTransform> {src: lin_rec709, dst: broken}\n");
+  std::ofstream(folder_.file("circle.ocio")) << circle;
   const struct {
     std::string options;
     int exitCode;
@@ -117,6 +121,8 @@ TEST_F(Views, ThatAreNotThereAreRefusedBeforeAnythingIsRead) {
       {"--view-transform Film --ocio-config " + config(), 1,
        config() + ": has no view 'Film'; there are: screen/Half, screen/Soft/Film, projector/Broken"},
       {"--view-transform Broken --ocio-config " + config(), 1, "no_such_table.spi1d"},
+      {"--view-transform Broken --ocio-config " + folder_.file("circle.ocio"), 1,
+       folder_.file("circle.ocio") + ": the colour space 'broken' is defined by itself"},
       {"--ocio-config " + folder_.file("none.ocio"), 1, folder_.file("none.ocio") + ": "},
       {"--ocio-config " + folder_.file("broken.ocio"), 1, folder_.file("broken.ocio") + ": "}};
   for (const auto& wrong : cases) {

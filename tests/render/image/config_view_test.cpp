@@ -1,6 +1,8 @@
 #include "nephele/render/image/config_view.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
@@ -27,6 +29,29 @@ class ConfigViews : public testing::Test {
       return error.what();
     }
     return "none";
+  }
+
+  /// What is said of a configuration whose view Half is defined so, and with what else it defines.
+  std::string refusalOf(const std::string& half, const std::string& others = {},
+                        const std::string& environment = "{}") const {
+    std::ofstream(config_) << "ocio_profile_version: 2\nenvironment: " << environment << R"(
+search_path: ""
+roles: {default: lin_rec709, scene_linear: lin_rec709}
+file_rules:
+  - !<Rule> {name: Default, colorspace: default}
+displays:
+  screen:
+    - !<View> {name: Half, colorspace: half}
+colorspaces:
+  - !<ColorSpace>
+    name: lin_rec709
+  - !<ColorSpace>
+    name: half
+    from_scene_reference: )"
+                           << half << '\n'
+                           << others;
+    std::string refused = refusal(config_, "Half");
+    return refused.starts_with(config_ + ": ") ? refused.substr(config_.size() + 2) : refused;
   }
 
   test::TemporaryFolder folder_;
@@ -94,6 +119,62 @@ TEST_F(ConfigViews, OfBrokenConfigurationsAreRefusedByName) {
   const std::string table = refusal(config_, "Broken");
   EXPECT_TRUE(table.starts_with(config_ + ": ")) << table;
   EXPECT_NE(table.find("no_such_table.spi1d"), std::string::npos) << table;
+}
+
+TEST_F(ConfigViews, DefinedByThemselvesAreRefused) {
+  const std::string circle = "the colour space 'half' is defined by itself";
+  EXPECT_EQ(refusalOf("!<ColorSpaceTransform> {src: lin_rec709, dst: half}"), circle);
+  EXPECT_EQ(refusalOf("!<DisplayViewTransform> {src: lin_rec709, display: screen, view: Half}"), circle);
+  EXPECT_EQ(
+      refusalOf("!<ColorSpaceTransform> {src: other, dst: lin_rec709}",
+                "  - !<ColorSpace>\n    name: other\n    to_scene_reference: !<GroupTransform> {children: "
+                "[!<ColorSpaceTransform> {src: lin_rec709, dst: half, direction: inverse}]}\n"),
+      circle);
+  EXPECT_EQ(refusalOf("!<LookTransform> {src: lin_rec709, dst: lin_rec709, looks: +warm}",
+                      "looks:\n  - !<Look>\n    name: warm\n    process_space: half\n"),
+            circle);
+  EXPECT_EQ(refusalOf("!<FileTransform> {src: $A}", "", "{A: x$A}"), "the variable 'A' is defined by itself");
+  // Another that is named more than once is none.
+  EXPECT_EQ(
+      refusalOf("!<GroupTransform> {children: [&a !<ColorSpaceTransform> {src: lin_rec709, dst: other}, *a]}",
+                "  - !<ColorSpace>\n    name: other\n    from_scene_reference: !<MatrixTransform> {}\n",
+                "{A: x, B: $A$A}"),
+      "none");
+}
+
+// 24 spaces of two steps each, 16.8 million in all.
+TEST_F(ConfigViews, OfMillionsOfStepsAreRefused) {
+  const std::string tooMuch = "leads through more than 10000 steps, or through 100 within each other";
+  std::string repeats = "!<GroupTransform> {children: [&a0 !<MatrixTransform> {}", spaces, chain, end = "]}";
+  for (int i = 1; i <= 24; ++i) {
+    repeats += fmt::format(", &a{0} !<GroupTransform> {{children: [*a{1}, *a{1}]}}", i, i - 1);
+    spaces += fmt::format(
+        "  - !<ColorSpace>\n    name: s{0}\n    from_scene_reference: !<GroupTransform> {{children: "
+        "[!<ColorSpaceTransform> {{src: s0, dst: s{1}}}, !<ColorSpaceTransform> {{src: s0, dst: s{1}}}]}}\n",
+        i, i - 1);
+  }
+  for (int i = 1; i <= 1000; ++i)
+    chain += fmt::format(
+        "  - !<ColorSpace>\n    name: s{}\n    from_scene_reference: !<ColorSpaceTransform> {{src: s0, dst: "
+        "s{}}}\n",
+        i, i - 1);
+  const std::string first = "  - !<ColorSpace>\n    name: s0\n";
+  EXPECT_EQ(refusalOf(repeats + end), "repeats parts of itself (*name) more than 16 times");
+  EXPECT_EQ(refusalOf("!<ColorSpaceTransform> {src: s0, dst: s24}", first + spaces), tooMuch);
+  EXPECT_EQ(refusalOf("!<ColorSpaceTransform> {src: s0, dst: s1000}", first + chain), tooMuch);
+  EXPECT_EQ(refusalOf("!<ColorSpaceTransform> {src: s0, dst: s50}", first + chain), "none");
+}
+
+TEST_F(ConfigViews, DoNotWaitForTablesThatAreNoFiles) {
+  const std::string pipe = folder_.file("pipe"), table = folder_.file("table.ctf");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, std::string("/dev/zero"), std::string("/dev")})
+    EXPECT_EQ(refusalOf("!<FileTransform> {src: " + path + "}"),
+              "the table " + path + " is no file that can be read");
+  std::ofstream(table)
+      << "<?xml version=\"1.0\"?>\n<ProcessList version=\"2\" id=\"a\">\n"
+         "<Reference inBitDepth=\"32f\" outBitDepth=\"32f\" path=\"/dev/zero\"/></ProcessList>\n";
+  EXPECT_EQ(refusalOf("!<FileTransform> {src: table.ctf}"), "the table " + table + " refers to other files");
 }
 
 }  // namespace
