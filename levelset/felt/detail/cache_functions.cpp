@@ -1,0 +1,68 @@
+#include "nephele/levelset/felt/detail/functions.h"
+#include "nephele/levelset/felt/domain_samples.h"
+
+namespace nephele::felt {
+
+namespace {
+
+template <class T>
+void write(const Context& context, Cache<T>& cache, const Field<T>& field) {
+  cache.values = sampled(field, cache.domain, context);
+}
+
+template <class T>
+Field<T> samplesOf(const Cache<T>& cache) {
+  if (!cache.values)
+    throw CallError(Code::noValue, "nothing has been written to this cache yet",
+                    "cachewrite(cache, field) fills it");
+  return *cache.values;
+}
+
+/// What there is of all three kinds of caches.
+template <class T>
+void addOfKind(Registry& r, const std::string& kind, const std::string& field) {
+  using Held = std::shared_ptr<Cache<T>>;
+  r.add("void cachewrite(" + kind + "cache cache, " + kind + "field f)",
+        "Samples `f` at the corners of all cells of the cache's domain. The field may read what was in the "
+        "cache before; fields that were read from it keep what they had.",
+        kind + "cache c(domain((-1,-1,-1), (2,2,2), 0.1)); cachewrite(c, " + field + ");",
+        [](Context& context, const Held& cache, const Field<T>& f) { write(context, *cache, f); });
+  r.add(kind + "field cacheread(" + kind + "cache cache)",
+        "What was written to the cache last, as a field: linear between samples, and outside the domain the "
+        "value of the nearest point of its border, so that a fluid loses nothing there. Its gradient is that "
+        "of differences over two cells, and does not see the border.",
+        kind + "cache c(domain((-1,-1,-1), (2,2,2), 0.1)); cachewrite(c, " + field + "); " + kind +
+            "field f = cacheread(c);",
+        [](const Held& cache) { return samplesOf(*cache); });
+  r.add(
+      kind + "field bake(" + kind + "field f, domain box)",
+      "`f` sampled at the corners of all cells of a domain: `cachewrite` and `cacheread` in one.",
+      kind + "field fast = bake(" + field + ", domain((-1,-1,-1), (2,2,2), 0.1));",
+      [](Context& context, const Field<T>& f, const Domain& domain) { return sampled(f, domain, context); });
+}
+
+}  // namespace
+
+int countWithin(const char* parameter, std::int64_t value, int lowest, int highest) {
+  if (value < lowest || value > highest)
+    throw CallError(Code::outOfRange, std::string(parameter) + " is " + std::to_string(value) +
+                                          ", and may be from " + std::to_string(lowest) + " to " +
+                                          std::to_string(highest));
+  return static_cast<int>(value);
+}
+
+float positive(const char* parameter, double value) {
+  const float result = static_cast<float>(value);
+  if (!(result > 0 && std::isfinite(result)))
+    throw CallError(Code::outOfRange, std::string(parameter) + " must be positive and finite");
+  return result;
+}
+
+void addCacheFunctions(Registry& r) {
+  r.group("caches");
+  addOfKind<float>(r, "scalar", "sphere((0,0,0), 1)");
+  addOfKind<Vec3f>(r, "vector", "identity()");
+  addOfKind<Mat3f>(r, "matrix", "grad(identity())");
+}
+
+}  // namespace nephele::felt

@@ -1,0 +1,13 @@
+#include "nephele/levelset/felt/grid_functions.h"
+
+#include "nephele/levelset/felt/detail/functions.h"
+#include "nephele/levelset/felt/flow_functions.h"
+
+namespace nephele::felt {
+
+void addLevelsetFunctions(Registry& registry) {
+  addCacheFunctions(registry);
+  addFlowFunctions(registry);
+}
+
+}  // namespace nephele::felt
