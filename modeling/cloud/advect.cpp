@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 
 namespace nephele {
@@ -191,6 +192,51 @@ ScalarField advect(const ScalarField& field, const VectorField& velocity, const 
 
 VectorField advect(const VectorField& field, const VectorField& velocity, const AdvectOptions& options) {
   return compose(field, traceBack(velocity, options));
+}
+
+namespace {
+
+ScalarField limited(const ScalarField& f, const std::vector<ScalarField>& between) {
+  ScalarField low = between[0], high = between[0];
+  for (const ScalarField& value : between) low = min(low, value), high = max(high, value);
+  return clamp(f, low, high);
+}
+
+VectorField limited(const VectorField& f, const std::vector<VectorField>& between) {
+  std::vector<ScalarField> parts;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<ScalarField> values;
+    for (const VectorField& value : between) values.push_back(component(value, c));
+    parts.push_back(limited(component(f, c), values));
+  }
+  return vectorField(parts[0], parts[1], parts[2]);
+}
+
+template <class T>
+Field<T> corrected(const Field<T>& f, const VectorField& velocity, float dt) {
+  const VectorField u = memo(velocity);
+  const VectorField before = memo(traceBack(u, {.dt = dt, .rule = TraceRule::euler}));
+  const VectorField after = traceBack(u, {.dt = -dt, .rule = TraceRule::euler});
+  const VectorField again = memo(compose(traceBack(velocity, {.dt = dt, .rule = TraceRule::euler}), after));
+  const Field<T> plain = memo(compose(f, before));
+  const ScalarField reach = memo(length(again - position()) + 0.5f * f.differenceStep());
+  std::vector<Field<T>> between{plain};
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto side = [&](int axis) { return corner >> axis & 1 ? 1.0f : -1.0f; };
+    const Vec3f away(side(0), side(1), side(2));
+    between.push_back(memo(compose(f, before + reach * VectorField(away))));
+  }
+  return limited(memo(plain + (f - compose(f, again)) * ScalarField(0.5f)), between);
+}
+
+}  // namespace
+
+ScalarField macCormack(const ScalarField& field, const VectorField& velocity, float dt) {
+  return corrected(field, velocity, dt);
+}
+
+VectorField macCormack(const VectorField& field, const VectorField& velocity, float dt) {
+  return corrected(field, velocity, dt);
 }
 
 }  // namespace nephele

@@ -43,4 +43,17 @@ VectorField traceBack(const std::vector<VectorField>& velocities, const AdvectOp
 ScalarField advect(const ScalarField& field, const VectorField& velocity, const AdvectOptions& options = {});
 VectorField advect(const VectorField& field, const VectorField& velocity, const AdvectOptions& options = {});
 
+/// One step by MacCormack's scheme: f(X(x)) + (f(x) - f(X(Y(x)))) / 2 with X(x) = x - u(x) dt and Y(x) =
+/// x + u(x) dt, so half of what a plain step there and back again loses is given back. Errors of second
+/// order.
+///
+/// Limited to the values of f at X(x) and at the corners of a cube about it, which reaches to each side half
+/// a cell of f's grid (half its differenceStep()) and as far as the step there and back again goes astray: no
+/// value comes up that f has not. Cost per point: 11 values of `field`, two of `velocity`.
+/// @throws Error if dt is not finite.
+/// Source: A. Selle and others, An Unconditionally Stable MacCormack Method (2008).
+ScalarField macCormack(const ScalarField& field, const VectorField& velocity, float dt);
+/// The same, component by component.
+VectorField macCormack(const VectorField& field, const VectorField& velocity, float dt);
+
 }  // namespace nephele

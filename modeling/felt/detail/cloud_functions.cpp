@@ -2,6 +2,7 @@
 #include "nephele/modeling/cloud/cumulo.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/cloud/nacelle.h"
+#include "nephele/modeling/cloud/obstacle.h"
 #include "nephele/modeling/cloud/surface_point.h"
 #include "nephele/modeling/felt/detail/functions.h"
 #include "nephele/modeling/field/operations.h"
@@ -16,15 +17,6 @@ using V = VectorField;
 
 AdvectOptions oneStep(double dt) {
   return {.dt = finite("dt", dt), .steps = 1, .rule = TraceRule::euler};
-}
-
-/// What MacCormack's scheme makes of a step: half of what a step there and back again loses is given back, as
-/// far as that stays between the two values that the step has to do with.
-template <class T>
-T corrected(const T& f, const V& velocity, double dt) {
-  const T there = memo(advect(f, velocity, oneStep(dt)));
-  const T back = advect(there, velocity, oneStep(-dt));
-  return there + advect((f - back) * S(0.5f), velocity, oneStep(dt));
 }
 
 S ramped(const S& f, const Array& places, const Array& values) {
@@ -89,15 +81,26 @@ void addCloudFunctions(Registry& r) {
         "vectorfield map = advect(identity(), curlnoise(), 0.1);",
         [](const V& f, const V& velocity, double dt) { return advect(f, velocity, oneStep(dt)); });
   r.add("scalarfield maccormack(scalarfield f, vectorfield velocity, float dt)",
-        "`advect` with errors of second order: half of what a step there and back again loses is given back. "
-        "Values "
-        "may leave the range of `f` a little. Costs four steps.",
+        "`advect` with errors of second order: half of what a step there and back again loses is given back, "
+        "as "
+        "far as values stay between those about the place that `advect` reads. Costs eleven times as much.",
         "scalarfield moved = maccormack(mask(sphere((0,0,0), 1), 0.2), (1,0,0), 0.5);",
-        [](const S& f, const V& velocity, double dt) { return corrected(f, velocity, dt); });
+        [](const S& f, const V& velocity, double dt) { return macCormack(f, velocity, finite("dt", dt)); });
   r.add("vectorfield maccormack(vectorfield f, vectorfield velocity, float dt)",
         "`advect` with errors of second order.",
         "vectorfield map = maccormack(identity(), curlnoise(), 0.1);",
-        [](const V& f, const V& velocity, double dt) { return corrected(f, velocity, dt); });
+        [](const V& f, const V& velocity, double dt) { return macCormack(f, velocity, finite("dt", dt)); });
+  r.add("vectorfield reflected(vectorfield velocity, scalarfield object, float retained = 1)",
+        "The velocity turned back where it flows into an object: with `retained` 1 it is thrown back, with 0 "
+        "it "
+        "sticks, and only what runs along the surface is left.",
+        "vectorfield flow = reflected((1,0,0), sphere((0,0,0), 1), 0.2);",
+        [](const V& velocity, const S& object, double retained) {
+          if (!(retained >= 0 && retained <= 1))
+            throw CallError(Code::outOfRange,
+                            "retained is " + std::to_string(retained) + ", and may be from 0 to 1");
+          return reflected(velocity, object, {.retained = static_cast<float>(retained)});
+        });
   r.add("vectorfield traceback(vectorfield velocity, float dt, int steps = 1)",
         "The map from where matter is after so many steps to where it was before them, by the midpoint rule.",
         "scalarfield moved = compose(mask(sphere((0,0,0), 1)), traceback(curlnoise(), 0.1, 4));",

@@ -70,6 +70,37 @@ TEST(Advect, MidpointIsOfSecondOrder) {
   EXPECT_LT(error(TraceRule::midpoint, 40), 1e-3);
 }
 
+/// Error of one step of a place that turns, which is as long as the turn.
+double errorOfTurn(bool isCorrected, float dt) {
+  const ScalarField x = component(position(), 0);
+  const ScalarField moved =
+      isCorrected ? macCormack(x, turning(), dt) : advect(x, turning(), {.dt = dt, .rule = TraceRule::euler});
+  // The point (0, 0, 1) was at (-sin, 0, cos).
+  const Vec3f now{0.3f, 0, 1};
+  return std::abs(double(moved(now)) - (0.3 * std::cos(double(dt)) - std::sin(double(dt))));
+}
+
+TEST(Advect, MacCormackIsOfSecondOrder) {
+  EXPECT_NEAR(errorOfTurn(false, 0.1f) / errorOfTurn(false, 0.05f), 4, 0.4);
+  EXPECT_NEAR(errorOfTurn(true, 0.2f) / errorOfTurn(true, 0.1f), 8, 1);
+}
+
+TEST(Advect, MacCormackMakesNoNewValues) {
+  const ScalarField step = mask(sphere({0, 0, 0}, 0.5f));
+  const VectorField colour = vectorField(step, 2.0f * step, 0.0f);
+  for (int i = 0; i < 500; ++i) {
+    const Vec3f p{-1 + 0.004f * float(i), 0.1f, -0.2f};
+    const float value = macCormack(step, turbulence(), 0.7f)(p);
+    EXPECT_TRUE(value >= 0 && value <= 1) << value;
+    EXPECT_EQ(macCormack(colour, turbulence(), 0.7f)(p).y, 2 * value);
+  }
+}
+
+TEST(Advect, MacCormackOfAWindIsAShift) {
+  const VectorField moved = macCormack(position(), VectorField(Vec3f{1, 0, 2}), 0.5f);
+  EXPECT_LT(length(moved({1, 2, 3}) - Vec3f{0.5f, 2, 2}), 1e-6f);
+}
+
 TEST(Advect, KeepsThePromisesOfFields) {
   for (const TraceRule rule : {TraceRule::euler, TraceRule::midpoint}) {
     SCOPED_TRACE(int(rule));
