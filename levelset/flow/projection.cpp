@@ -57,7 +57,10 @@ struct WaveNumber {
 class Projection {
  public:
   Projection(const VectorField& velocity, const ProjectionBox& box)
-      : velocity_(velocity), box_(box), n_(box.count), values_{BoxValues(n_), BoxValues(n_), BoxValues(n_)} {
+      : velocity_(velocity),
+        box_(box),
+        n_(box.cells + (isClosed() ? Vec3i{1, 1, 1} : Vec3i{})),
+        values_{BoxValues(n_), BoxValues(n_), BoxValues(n_)} {
     const Mat3f& linear = box.lattice.indexToWorld.linear;
     for (int axis = 0; axis < 3; ++axis) {
       const Vec3f edge = column(linear, axis);
@@ -72,7 +75,7 @@ class Projection {
       waves.fill(isClosed() ? Waves::cosines : Waves::exponentials);
       if (isClosed()) waves[std::size_t(component)] = Waves::sines;
       // A periodic box treats all components alike.
-      if (transforms_.empty() || isClosed()) transforms_.emplace_back(n_, waves);
+      if (transforms_.empty() || isClosed()) transforms_.emplace_back(box.cells, waves);
     }
   }
 
@@ -133,7 +136,7 @@ class Projection {
 
   /// Wave number of place `i` along an axis.
   WaveNumber waveNumber(int axis, int i) const {
-    return {i, isClosed() ? 2 * n_[axis] : n_[axis], edges_[axis]};
+    return {i, isClosed() ? 2 * box_.cells[axis] : box_.cells[axis], edges_[axis]};
   }
 
   void project(const Progress& progress) {
@@ -141,7 +144,8 @@ class Projection {
     for (std::size_t x = 0; x < values_[0].rowLength(); ++x)
       alongX.push_back(waveNumber(0, int(isClosed() ? x : x / 2)));
     for (int z = 0; z < n_.z; ++z) alongZ.push_back(waveNumber(2, z));
-    const float scale = float((isClosed() ? 0.125 : 1.0) / (double(n_.x) * double(n_.y) * double(n_.z)));
+    const float scale = float((isClosed() ? 0.125 : 1.0) /
+                              (double(box_.cells.x) * double(box_.cells.y) * double(box_.cells.z)));
     const std::size_t plane = values_[0].planeLength();
     parallelFor(
         std::size_t(n_.y), 1,
@@ -207,11 +211,10 @@ class Projection {
   };
 
   Source sourceOf(int axis, int i) const {
-    const int n = n_[axis];
-    if (i < -1 || i > n) return {};
-    if (i >= 0 && i < n) return {i, true, false};
-    if (isClosed()) return {i < 0 ? 0 : n - 1, true, true};
-    return {i < 0 ? n - 1 : 0, true, false};
+    const int cells = box_.cells[axis];
+    if (i < -1 || i > cells + 1) return {};
+    if (!isClosed()) return {(i + cells) % cells, true, false};
+    return {std::abs(i > cells ? 2 * cells - i : i), true, i < 0 || i > cells};
   }
 
   /// Voxel (1, 1, 1) is sample (0, 0, 0), so that the samples before it lie in bricks of their own no more
@@ -224,7 +227,7 @@ class Projection {
 
   VectorField bricks(const Progress& progress) {
     BrickBox places;
-    for (int axis = 0; axis < 3; ++axis) places.count[axis] = (n_[axis] + 1) / kBrickSide + 1;
+    for (int axis = 0; axis < 3; ++axis) places.count[axis] = (box_.cells[axis] + 2) / kBrickSide + 1;
     std::vector<std::int32_t> table(places.size());
     for (std::size_t b = 0; b < table.size(); ++b) table[b] = std::int32_t(b + 1);
     std::array<std::shared_ptr<BrickGrid>, 3> grids;
@@ -278,6 +281,7 @@ class Projection {
 
   const VectorField& velocity_;
   const ProjectionBox& box_;
+  /// Samples along each axis.
   Vec3i n_;
   /// Of a cell.
   Vec3f edges_;
@@ -290,12 +294,12 @@ class Projection {
 };
 
 void requireSane(const ProjectionBox& box) {
-  const Vec3i& n = box.count;
+  const Vec3i& n = box.cells;
   require(n.x >= 1 && n.y >= 1 && n.z >= 1,
-          fmt::format("projection: the box must have 1 sample or more along each axis, not {} x {} x {}", n.x,
+          fmt::format("projection: the box must have 1 cell or more along each axis, not {} x {} x {}", n.x,
                       n.y, n.z));
   require(double(n.x) * n.y * n.z <= 2147483648.0,
-          fmt::format("projection: a box of {} x {} x {} samples is too large", n.x, n.y, n.z));
+          fmt::format("projection: a box of {} x {} x {} cells is too large", n.x, n.y, n.z));
 }
 
 }  // namespace

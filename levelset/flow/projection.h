@@ -15,14 +15,13 @@ enum class Walls {
   closed,
 };
 
-/// A box and the samples in it. Each sample is the centre of a cell, so that the faces lie half a cell beyond
-/// the outermost samples.
+/// A box of cells and the samples at their corners.
 struct ProjectionBox {
-  /// Sample (i, j, k) lies at indexToWorld(i, j, k). The box may be turned and its cells oblong, but their
-  /// edges must be perpendicular to each other.
+  /// Sample (i, j, k) lies at indexToWorld(i, j, k), the first at (0, 0, 0). The box may be turned and its
+  /// cells oblong, but their edges must be perpendicular to each other.
   Lattice lattice;
-  /// Samples along each axis, 1 or more.
-  Vec3i count{1, 1, 1};
+  /// Cells along each axis, 1 or more.
+  Vec3i cells{1, 1, 1};
   Walls walls = Walls::periodic;
 };
 
@@ -39,8 +38,8 @@ struct ProjectionBox {
 /// The result is trilinear on one grid per component (see gridsOf), which go one sample beyond the box so
 /// that differences are right up to its faces; from there on it is 0.
 /// Cost: the velocity once per sample, six transforms and three grids, on all cores; memory beside the result
-/// is 12 bytes per sample and up to 16 more per row. The same bits at any thread count.
-/// @throws Error if the box has no samples or more than 2^31, its edges are not perpendicular, or the
+/// is 12 bytes per sample and up to 192 per row. The same bits at any thread count.
+/// @throws Error if the box has no cells or more than 2^31, its edges are not perpendicular, or the
 /// velocity is not finite at a sample; Cancelled.
 /// Source: Tessendorf, Resolution Independent Volumes, chapter 6 (tdivfree).
 VectorField withoutDivergence(const VectorField& velocity, const ProjectionBox& box,

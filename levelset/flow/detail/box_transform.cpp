@@ -44,13 +44,13 @@ void scatter(const float* block, int count, float* to, std::size_t stride) {
     std::memcpy(to + std::size_t(i) * stride, block + std::size_t(i) * kBlock, kBlock * sizeof(float));
 }
 
-BoxTransform::BoxTransform(const Vec3i& count, const std::array<Waves, 3>& waves)
-    : lines_{LineTransform(count.x, waves[0], Direction::forward, LineTransform::Layout::row),
-             LineTransform(count.y, waves[1], Direction::forward, LineTransform::Layout::block),
-             LineTransform(count.z, waves[2], Direction::forward, LineTransform::Layout::block),
-             LineTransform(count.x, waves[0], Direction::inverse, LineTransform::Layout::row),
-             LineTransform(count.y, waves[1], Direction::inverse, LineTransform::Layout::block),
-             LineTransform(count.z, waves[2], Direction::inverse, LineTransform::Layout::block)} {}
+BoxTransform::BoxTransform(const Vec3i& cells, const std::array<Waves, 3>& waves)
+    : lines_{LineTransform(cells.x, waves[0], Direction::forward, LineTransform::Layout::row),
+             LineTransform(cells.y, waves[1], Direction::forward, LineTransform::Layout::block),
+             LineTransform(cells.z, waves[2], Direction::forward, LineTransform::Layout::block),
+             LineTransform(cells.x, waves[0], Direction::inverse, LineTransform::Layout::row),
+             LineTransform(cells.y, waves[1], Direction::inverse, LineTransform::Layout::block),
+             LineTransform(cells.z, waves[2], Direction::inverse, LineTransform::Layout::block)} {}
 
 void BoxTransform::forwardInPlane(const BoxValues& values, int z) const {
   for (int y = 0; y < values.count().y; ++y) lines_[0].run(values.row(y, z));

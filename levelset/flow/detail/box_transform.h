@@ -9,14 +9,16 @@
 /// Sums of waves along the axes of a box, in place. For the projection of flows.
 namespace nephele::detail {
 
-/// The functions of j that a row of n numbers is a sum of. Forward and back again is `kind` times n.
+/// The functions of j that a row of numbers is a sum of; there are n cells between them. Forward and back
+/// again is a multiple of what was there.
 enum class Waves {
-  /// e^(2 pi i k j / n). Along x, where numbers are real, those with k from 0 to n / 2; twice 1 times n.
+  /// e^(2 pi i k j / n) for n numbers. Along x, where numbers are real, those with k from 0 to n / 2. n
+  /// times.
   exponentials,
-  /// cos(pi k (j + 1/2) / n), k from 0 to n - 1; 2 n.
+  /// cos(pi k j / n), k from 0 to n, for n + 1 numbers. 2 n times.
   cosines,
-  /// sin(pi k (j + 1/2) / n), k from 0, which is 0, to n - 1; 2 n. The wave k = n, which alternates, is
-  /// dropped.
+  /// sin(pi k j / n), k from 0 to n, for n + 1 numbers, of which the first and the last count as 0. 2 n
+  /// times.
   sines,
 };
 
@@ -29,13 +31,13 @@ inline constexpr std::size_t kBlock = 16;
 class LineTransform {
  public:
   enum class Layout {
-    /// n reals, to n / 2 + 1 complex numbers where waves are exponentials.
+    /// Reals; they become n / 2 + 1 complex numbers where waves are exponentials.
     row,
-    /// n times kBlock reals, or kBlock / 2 complex numbers where waves are exponentials.
+    /// For each number kBlock reals, or kBlock / 2 complex numbers where waves are exponentials.
     block,
   };
 
-  LineTransform(int n, Waves waves, Direction direction, Layout layout);
+  LineTransform(int cells, Waves waves, Direction direction, Layout layout);
   ~LineTransform();
   LineTransform(LineTransform&&) noexcept;
 
@@ -79,7 +81,7 @@ class BoxValues {
 /// The transforms of a box, axis by axis.
 class BoxTransform {
  public:
-  BoxTransform(const Vec3i& count, const std::array<Waves, 3>& waves);
+  BoxTransform(const Vec3i& cells, const std::array<Waves, 3>& waves);
 
   /// Along x and then y, or the other way round, of one plane of `values`. From several threads at once for
   /// different planes.

@@ -4,7 +4,6 @@
 #include <fftw3.h>
 
 #include <algorithm>
-#include <cstring>
 #include <mutex>
 
 #include "nephele/levelset/flow/detail/box_transform.h"
@@ -23,11 +22,6 @@ fftwf_complex* complexAt(float* values) {
   return reinterpret_cast<fftwf_complex*>(values);
 }
 
-fftw_r2r_kind kindOf(Waves waves, Direction direction) {
-  if (direction == Direction::forward) return waves == Waves::cosines ? FFTW_REDFT10 : FFTW_RODFT10;
-  return waves == Waves::cosines ? FFTW_REDFT01 : FFTW_RODFT01;
-}
-
 }  // namespace
 
 struct LineTransform::Plan {
@@ -38,6 +32,8 @@ struct LineTransform::Plan {
   fftwf_plan plan = nullptr;
 
   std::size_t stride() const { return layout == Layout::row ? 1 : kBlock; }
+  /// Numbers that are transformed. Sines have the first and the last to themselves.
+  int count() const { return waves == Waves::exponentials ? n : waves == Waves::cosines ? n + 1 : n - 1; }
 
   fftwf_plan made(float* values) const {
     const bool isForward = direction == Direction::forward;
@@ -49,25 +45,26 @@ struct LineTransform::Plan {
       return fftwf_plan_many_dft(1, &n, kComplexSide, complexAt(values), nullptr, kComplexSide, 1,
                                  complexAt(values), nullptr, kComplexSide, 1,
                                  isForward ? FFTW_FORWARD : FFTW_BACKWARD, FFTW_ESTIMATE);
-    const fftw_r2r_kind kind = kindOf(waves, direction);
-    const int columns = layout == Layout::row ? 1 : kSide;
-    return fftwf_plan_many_r2r(1, &n, columns, values, nullptr, columns, 1, values, nullptr, columns, 1,
+    const fftw_r2r_kind kind = waves == Waves::cosines ? FFTW_REDFT00 : FFTW_RODFT00;
+    const int length = count(), columns = int(stride());
+    return fftwf_plan_many_r2r(1, &length, columns, values, nullptr, columns, 1, values, nullptr, columns, 1,
                                &kind, FFTW_ESTIMATE);
   }
 };
 
-LineTransform::LineTransform(int n, Waves waves, Direction direction, Layout layout)
-    : plan_(std::make_unique<Plan>(Plan{n, waves, direction, layout})) {
-  const AlignedFloats room = alignedFloats(std::size_t(n + 2) * kBlock);
+LineTransform::LineTransform(int cells, Waves waves, Direction direction, Layout layout)
+    : plan_(std::make_unique<Plan>(Plan{cells, waves, direction, layout})) {
+  if (plan_->count() == 0) return;
+  const AlignedFloats room = alignedFloats(std::size_t(cells + 2) * kBlock);
   const std::lock_guard lock(planner());
-  plan_->plan = plan_->made(room.get());
+  plan_->plan = plan_->made(room.get() + (waves == Waves::sines ? plan_->stride() : 0));
   require(plan_->plan != nullptr, "projection: there is no transform of this length");
 }
 
 LineTransform::LineTransform(LineTransform&&) noexcept = default;
 
 LineTransform::~LineTransform() {
-  if (!plan_) return;
+  if (!plan_ || !plan_->plan) return;
   const std::lock_guard lock(planner());
   fftwf_destroy_plan(plan_->plan);
 }
@@ -84,17 +81,14 @@ void LineTransform::run(float* values) const {
       fftwf_execute_dft_c2r(p.plan, complexAt(values), values);
     return;
   }
-  // FFTW numbers sines from k = 1 on.
-  const std::size_t stride = p.stride(), rest = (std::size_t(p.n) - 1) * stride;
-  if (p.waves == Waves::sines && !isForward) {
-    std::memmove(values, values + stride, rest * sizeof(float));
-    std::fill_n(values + rest, stride, 0.0f);
+  if (p.waves == Waves::cosines) {
+    fftwf_execute_r2r(p.plan, values, values);
+    return;
   }
-  fftwf_execute_r2r(p.plan, values, values);
-  if (p.waves == Waves::sines && isForward) {
-    std::memmove(values + stride, values, rest * sizeof(float));
-    std::fill_n(values, stride, 0.0f);
-  }
+  const std::size_t stride = p.stride();
+  if (p.plan) fftwf_execute_r2r(p.plan, values + stride, values + stride);
+  std::fill_n(values, stride, 0.0f);
+  std::fill_n(values + std::size_t(p.n) * stride, stride, 0.0f);
 }
 
 }  // namespace nephele::detail

@@ -32,12 +32,12 @@ std::string printed(const std::string& script) {
 
 const std::string kRegion = "domain region = domain((-1,-1,-1), (2,2,2), (0,0,0), 0.1, 0.1, 0.1);\n";
 
-// Sample (i, j, k) of the region is at -0.95 + 0.1 (i, j, k).
-TEST(FlowFunctions, TdivfreeLeavesNoDivergenceAtTheCentresOfCells) {
+// Corner (i, j, k) is at -1 + 0.1 (i, j, k).
+TEST(FlowFunctions, TdivfreeLeavesNoDivergenceAtTheCornersOfCells) {
   for (const std::string walls : {"", ", \"closed\"", ", walls = \"periodic\""}) {
     std::ostringstream script;
     script << kRegion << "vectorfield u = perlin(3) * (1,2,3);\nvectorfield v = tdivfree(u, region" << walls
-           << ");\nfor (int i = 0; i < 20; i = i + 1) {\n  vector p = (-0.95 + 0.1 * i, 0.05, 0.25);\n"
+           << ");\nfor (int i = 0; i <= 20; i = i + 1) {\n  vector p = (-1 + 0.1 * i, 0.1, 0.3);\n"
               "  print(abs(eval(div(v), p)), abs(eval(div(u), p)));\n}\n";
     std::istringstream numbers(printed(script.str()));
     double after, before, sum = 0;
@@ -47,16 +47,21 @@ TEST(FlowFunctions, TdivfreeLeavesNoDivergenceAtTheCentresOfCells) {
       sum += before;
       ++lines;
     }
-    EXPECT_EQ(lines, 20);
+    EXPECT_EQ(lines, 21);
     EXPECT_GT(sum, 1) << walls;
   }
 }
 
-TEST(FlowFunctions, TdivfreeOfARegionWhoseCellsDoNotDivideItFillsIt) {
-  EXPECT_EQ(printed("domain region = domain((0,0,0), (1,1,1), (0,0,0), 0.3, 0.3, 0.3);\n"
-                    "vectorfield v = tdivfree(vectorfield((1,0,0)), region);\n"
-                    "print(eval(v, (0.999, 0.5, 0.001)).x > 0.999, eval(v, (1.6, 0.5, 0.5)).x);"),
-            "true 0\n");
+TEST(FlowFunctions, TdivfreeGoesOnBeyondARegion) {
+  const std::string flow = "vectorfield v = tdivfree(perlin(3) * (1,2,3), region";
+  EXPECT_EQ(printed(kRegion + flow +
+                    ");\nvector a = eval(v, (0.33, 0.9, -0.71)), b = eval(v, (2.33, -1.1, -4.71));\n"
+                    "print(sqrt(a * a) > 0.01, sqrt((a - b) * (a - b)) < 0.00001);"),
+            "true true\n");
+  EXPECT_EQ(printed(kRegion + flow +
+                    ", \"closed\");\nvector a = eval(v, (0.33, 1, -0.71)), b = eval(v, (0.33, 7, "
+                    "-0.71));\nprint(abs(a.y) < 0.00001, sqrt((a - b) * (a - b)) < 0.01);"),
+            "true true\n");
 }
 
 TEST(FlowFunctions, TdivfreeNamesTheWallsThatThereAre) {

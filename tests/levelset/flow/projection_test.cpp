@@ -19,11 +19,9 @@ namespace {
 
 using std::numbers::pi;
 
-/// Samples at the centres of n^3 cells of the unit cube.
+/// The unit cube of n^3 cells.
 ProjectionBox unitCube(int n, Walls walls) {
-  Affine map{Mat3f::scaling(1.0f / float(n)), {}};
-  map.translation = Vec3f(0.5f, 0.5f, 0.5f) * (1.0f / float(n));
-  return {Lattice::of(map), {n, n, n}, walls};
+  return {Lattice::uniform(1.0f / float(n)), {n, n, n}, walls};
 }
 
 VectorField function(std::function<Vec3f(const Vec3f&)> f) {
@@ -32,9 +30,9 @@ VectorField function(std::function<Vec3f(const Vec3f&)> f) {
 
 template <class Visit>
 void forSamples(const ProjectionBox& box, const Visit& visit) {
-  for (int z = 0; z < box.count.z; ++z)
-    for (int y = 0; y < box.count.y; ++y)
-      for (int x = 0; x < box.count.x; ++x)
+  for (int z = 0; z <= box.cells.z; ++z)
+    for (int y = 0; y <= box.cells.y; ++y)
+      for (int x = 0; x <= box.cells.x; ++x)
         visit(Vec3i{x, y, z}, box.lattice.indexToWorld(Vec3f(Vec3i{x, y, z})));
 }
 
@@ -159,8 +157,9 @@ TEST(Projection, LeavesACurl) {
   const float cell = 1.0f / 15;
   const VectorField curl = function([&](const Vec3f& p) {
     const auto at = [&](int axis, int step) {
-      Vec3i i(Vec3f(std::round(p.x * 15 - 0.5f), std::round(p.y * 15 - 0.5f), std::round(p.z * 15 - 0.5f)));
-      i[axis] = (i[axis] + step + 15) % 15;
+      Vec3i i(Vec3f(std::round(p.x * 15), std::round(p.y * 15), std::round(p.z * 15)));
+      i[axis] += step;
+      for (int a = 0; a < 3; ++a) i[a] = (i[a] + 15) % 15;
       return potential(box.lattice.indexToWorld(Vec3f(i)));
     };
     const auto along = [&](int axis) { return (at(axis, 1) - at(axis, -1)) / (2 * cell); };
@@ -215,9 +214,9 @@ TEST(Projection, IsOnGrids) {
 TEST(Projection, RefusesWhatIsNoBoxOrNoVelocity) {
   const VectorField wind(Vec3f(1, 0, 0));
   ProjectionBox box = unitCube(4, Walls::periodic);
-  box.count.y = 0;
+  box.cells.y = 0;
   EXPECT_THROW(withoutDivergence(wind, box), Error);
-  box.count = {4, 4, 4};
+  box.cells = {4, 4, 4};
   EXPECT_THROW(withoutDivergence(VectorField(Vec3f(NAN, 0, 0)), box), Error);
   Affine oblique;
   oblique.linear(0, 1) = 0.5f;
