@@ -203,19 +203,6 @@ class Mender {
   std::vector<Vec3i> places_;
 };
 
-void requireRoom(const Domain& domain, int components, const Context& context) {
-  constexpr double kShare = 0.8, kGigabyte = 1e9;
-  const double allowed = context.limits.memoryBytes.value_or(kShare * allowedMemory());
-  const double needed = sampledBytes(domain, components);
-  if (needed <= allowed) return;
-  const auto cells = domain.cells();
-  throw CallError(
-      Code::limit,
-      fmt::format("the samples of {} x {} x {} cells may take {:.3g} GB, and {:.3g} GB are allowed", cells.x,
-                  cells.y, cells.z, needed / kGigabyte, allowed / kGigabyte),
-      "give the domain larger cells or a smaller box");
-}
-
 std::array<Grid, 1> baked(const ScalarField& field, const BakeOptions& options, const Progress& progress) {
   return {bakeGrid(field, options, progress)};
 }
@@ -247,6 +234,19 @@ double sampledBytes(const Domain& domain, int components) {
   double bricks = 1;
   for (int axis = 0; axis < 3; ++axis) bricks *= brickOf(cells[axis] + 2) + 1;
   return kMaking * bricks * components * BrickGrid::kVolume * sizeof(float);
+}
+
+void requireRoom(const Domain& domain, int components, const Context& context) {
+  constexpr double kShare = 0.8, kGigabyte = 1e9;
+  const double allowed = context.limits.memoryBytes.value_or(kShare * allowedMemory());
+  const double needed = sampledBytes(domain, components);
+  if (needed <= allowed) return;
+  const auto cells = domain.cells();
+  throw CallError(
+      Code::limit,
+      fmt::format("the samples of {} x {} x {} cells may take {:.3g} GB, and {:.3g} GB are allowed", cells.x,
+                  cells.y, cells.z, needed / kGigabyte, allowed / kGigabyte),
+      "give the domain larger cells or a smaller box");
 }
 
 template <class T>

@@ -25,6 +25,8 @@ Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& con
 
 /// Bytes that `sampled` needs at most, for so many components.
 double sampledBytes(const Domain& domain, int components);
+/// @throws CallError if that is more than `context` allows.
+void requireRoom(const Domain& domain, int components, const Context& context);
 
 extern template Field<float> sampled(const Field<float>&, const Domain&, const Context&);
 extern template Field<Vec3f> sampled(const Field<Vec3f>&, const Domain&, const Context&);

@@ -1,5 +1,6 @@
 #include "nephele/levelset/felt/flow_functions.h"
 
+#include "nephele/levelset/felt/domain_samples.h"
 #include "nephele/levelset/flow/projection.h"
 #include "nephele/modeling/felt/diagnostic.h"
 #include "nephele/modeling/field/operations.h"
@@ -15,13 +16,9 @@ Walls wallsNamed(const std::string& name) {
   throw CallError(Code::outOfRange, "walls is \"" + name + "\", and may be \"periodic\" or \"closed\"");
 }
 
-/// The corners of the cells of `region`, where caches have their samples.
+/// With the samples that caches have.
 ProjectionBox boxOf(const Domain& region, Walls walls) {
-  requireValid(region);
-  Affine samples = region.toWorld();
-  for (int axis = 0; axis < 3; ++axis)
-    for (int row = 0; row < 3; ++row) samples.linear(row, axis) *= static_cast<float>(region.cell[axis]);
-  return {Lattice::of(samples), Vec3i(region.cells()), walls};
+  return {Lattice::of(sampleToWorld(region)), Vec3i(region.cells()), walls};
 }
 
 VectorField mapped(const VectorField& v, const Affine& map) {
@@ -58,6 +55,9 @@ void addFlowFunctions(Registry& r) {
         "vectorfield flow = tdivfree(perlin(2) * (0,1,0), region, \"closed\");",
         [](const Context& context, const VectorField& velocity, const Domain& region,
            const std::string& walls) {
+          // Three components as grids, and three as plain numbers while they are made.
+          requireValid(region);
+          requireRoom(region, 4, context);
           const ProjectionBox box = boxOf(region, wallsNamed(walls));
           return continued(withoutDivergence(velocity, box, *context.progress), box);
         });
