@@ -3,9 +3,9 @@
 // A marcher that walks one lattice is simple and fast, so grids are brought to the finest of their lattices
 // once: every brick that any of them reaches is filled with the sum of all, sample by sample. Trilinear
 // interpolation on lattices whose cells divide each other gives the same values before and after; on others
-// it errs by the square of the finest voxel. What is stored is extinction per colour, that is density times
-// colour and not the colour itself: extinctions add, colours do not, and an edge where density and colour
-// both fall to nothing keeps its colour.
+// it errs by the square of the finest voxel, most at the foot of edges that are as thin as a voxel. What is
+// stored is extinction per colour, that is density times colour and not the colour itself: extinctions add,
+// colours do not, and an edge where density and colour both fall to nothing keeps its colour.
 //
 // Bricks are found through the boxes of the sources' bricks, evaluated in parallel in chunks, and numbered in
 // the order of the table. Bricks of one value are stored once.
@@ -25,6 +25,7 @@
 #include <map>
 #include <optional>
 #include <tuple>
+#include <type_traits>
 
 #include "nephele/levelset/grid/brick_box.h"
 #include "nephele/modeling/base/error.h"
@@ -221,7 +222,12 @@ void Combiner::add(const PartSources& sources, const BlackBodyColours& incandesc
                    float (&values)[kChannels]) const {
   const VolumePart& part = *sources.part;
   if (sources.density) {
-    const float density = part.share * std::max(sources.density->at(voxel), 0.0f);
+    float found;
+    if constexpr (std::is_same_v<Place, Vec3i>)
+      found = sources.density->fitted(voxel);
+    else
+      found = sources.density->at(voxel);
+    const float density = part.share * std::max(found, 0.0f);
     values[0] += density;
     if (hasColour_ && density > 0)
       for (int c = 0; c != 3; ++c) {

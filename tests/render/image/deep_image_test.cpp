@@ -9,6 +9,7 @@
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/march/raymarch.h"
 #include "nephele/render/scene/holdout.h"
+#include "nephele/render/volume/volume_parts.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 
@@ -225,6 +226,38 @@ TEST(Holdout, ElementsHeldOutByEachOtherAddUpToTheWhole) {
     for (int x = 10; x != 14; ++x)
       EXPECT_NEAR(heldA.at("A", x, y) + heldB.at("A", x, y),
                   1 - (1 - wholeA.image.at("A", x, y)) * (1 - wholeB.image.at("A", x, y)), 0.002f);
+}
+
+TEST(Holdout, ElementsOfOtherVoxelsAddUpToTheirSum) {
+  // Two balls with edges of a voxel, of voxels that do not divide each other, side by side and overlapping:
+  // the picture of both is marched on the finer voxels.
+  const auto at = [](float x, float z, float voxel) {
+    VolumePart part;
+    const int n = int(1.5f / voxel);
+    part.density = test::densityGrid(test::voxels(voxel), {-n, -n, -n}, {n, n, n}, [=](const Vec3f& p) {
+      return std::clamp((0.8f - length(p - Vec3f{x, 0, z})) / voxel, 0.0f, 1.0f);
+    });
+    return part;
+  };
+  const VolumePart a = at(-0.3f, 0.3f, 0.0643f), b = at(0.3f, -0.3f, 0.1f);
+  RenderOptions options = deepOptions(0.001f);
+  options.step = 0.0125f;
+  options.samples = 16;
+  const RenderVolume volumeA = combine({a}), volumeB = combine({b}), volume = combine({a, b});
+  const auto heldOutBy = [&](const RenderVolume& seen, const RenderVolume& other) {
+    RenderOptions held = options;
+    held.holdout =
+        std::make_shared<const Holdout>(*renderImage(other, medium(20), kLights, front(), options).deep);
+    return renderImage(seen, medium(20), kLights, front(), held).image;
+  };
+  const Image both = renderImage(volume, medium(20), kLights, front(), options).image,
+              heldA = heldOutBy(volumeA, volumeB), heldB = heldOutBy(volumeB, volumeA);
+  const std::vector<float>&whole = both.channel("A").values, &ofA = heldA.channel("A").values,
+        &ofB = heldB.channel("A").values;
+  int off = 0;
+  for (std::size_t i = 0; i != whole.size(); ++i) off += std::fabs(ofA[i] + ofB[i] - whole[i]) > 0.05f;
+  // At rims, where both are brought to the finer voxels; a picture has 576 pixels.
+  EXPECT_LE(off, 14);
 }
 
 TEST(Holdout, IsRefusedForPicturesOfAnotherSize) {

@@ -10,6 +10,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/march/raymarch.h"
 #include "nephele/render/scene/black_body.h"
+#include "nephele/render/volume/trilinear.h"
 #include "tests/support/density.h"
 
 namespace nephele {
@@ -130,6 +131,30 @@ TEST(VolumeParts, TurnedAndStretchedGridsStandWhereTheyAre) {
       }
   EXPECT_NEAR(mass * 0.05 * 0.05 * 0.05, 2 * 4.0 / 3 * 3.14159265 * 0.9 * 0.9 * 0.9, 0.05);
   for (int axis = 0; axis != 3; ++axis) EXPECT_NEAR(moment[axis] / mass, double(centre[axis]), 2e-3);
+}
+
+TEST(VolumeParts, EndWhereTheyDidOnVoxelsThatDoNotDivideTheirOwn) {
+  // The lower half of an oblique edge of one voxel, on voxels of 0.0643 in all phases: its mean density is
+  // that of the grid itself.
+  const auto ramp = densityGrid(voxels(0.1f), {-14, -14, -14}, {14, 14, 14}, [](const Vec3f& p) {
+    return std::clamp(0.5f + (p.x + 0.37f * p.y) / 0.1f, 0.0f, 1.0f);
+  });
+  const RenderVolume volume = combine({part(ramp), part(ball(0.2f, 0.0643f), 0)});
+  ASSERT_FLOAT_EQ(volume.density().voxelSize(), 0.0643f);
+  const auto before = [](const BrickGrid& grid) {
+    double sum = 0;
+    int count = 0;
+    for (float y = -0.9f; y < 0.9f; y += 0.013f)
+      for (float x = -0.3f; x < 0; x += 0.005f, ++count)
+        sum += double(sampleGrid(grid, Vec3d(grid.worldToIndex()(Vec3f{x - 0.37f * y, y, 0}))));
+    return sum / count;
+  };
+  EXPECT_NEAR(before(volume.density()) / before(*ramp), 1, 0.02);
+  // Nothing rings.
+  for (const Interval& range : volume.density().ranges()) {
+    EXPECT_GE(range.min, 0);
+    EXPECT_LE(range.max, 1);
+  }
 }
 
 TEST(VolumeParts, ColoursMixByTheirShareOfTheDensity) {
