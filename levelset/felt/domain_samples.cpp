@@ -236,24 +236,28 @@ double sampledBytes(const Domain& domain, int components) {
   return kMaking * bricks * components * BrickGrid::kVolume * sizeof(float);
 }
 
-void requireRoom(const Domain& domain, int components, const Context& context) {
+void requireBytes(double needed, const std::string& what, const std::string& hint, const Context& context) {
   constexpr double kShare = 0.8, kGigabyte = 1e9;
   const double allowed = context.limits.memoryBytes.value_or(kShare * allowedMemory());
-  const double needed = sampledBytes(domain, components);
-  if (needed <= allowed) return;
+  if (needed > allowed)
+    throw CallError(Code::limit,
+                    fmt::format("{} may take {:.3g} GB, and {:.3g} GB are allowed", what, needed / kGigabyte,
+                                allowed / kGigabyte),
+                    hint);
+}
+
+void requireRoom(const Domain& domain, int components, const Context& context) {
+  requireValid(domain);
   const auto cells = domain.cells();
-  throw CallError(
-      Code::limit,
-      fmt::format("the samples of {} x {} x {} cells may take {:.3g} GB, and {:.3g} GB are allowed", cells.x,
-                  cells.y, cells.z, needed / kGigabyte, allowed / kGigabyte),
-      "give the domain larger cells or a smaller box");
+  requireBytes(sampledBytes(domain, components),
+               fmt::format("the samples of {} x {} x {} cells", cells.x, cells.y, cells.z),
+               "give the domain larger cells or a smaller box", context);
 }
 
 template <class T>
 Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& context) {
-  requireValid(domain);
-  if (nephele::detail::constantOf(field.node())) return field;
   requireRoom(domain, kComponents<T>, context);
+  if (nephele::detail::constantOf(field.node())) return field;
   const Vec3i cells = cellsOf(domain);
   // From the layer before the first samples to the one behind the last.
   const Box box{{0.5f, 0.5f, 0.5f}, {float(cells.x) + 1.5f, float(cells.y) + 1.5f, float(cells.z) + 1.5f}};

@@ -23,10 +23,13 @@ Affine sampleToWorld(const Domain& domain);
 template <class T>
 Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& context);
 
+/// Refuses what needs more memory than `context` allows. `what` and `hint` go into the message.
+/// @throws CallError
+void requireBytes(double needed, const std::string& what, const std::string& hint, const Context& context);
+/// The same for so many components of samples on a domain. @throws also Error as `requireValid`
+void requireRoom(const Domain& domain, int components, const Context& context);
 /// Bytes that `sampled` needs at most, for so many components.
 double sampledBytes(const Domain& domain, int components);
-/// @throws CallError if that is more than `context` allows.
-void requireRoom(const Domain& domain, int components, const Context& context);
 
 extern template Field<float> sampled(const Field<float>&, const Domain&, const Context&);
 extern template Field<Vec3f> sampled(const Field<Vec3f>&, const Domain&, const Context&);

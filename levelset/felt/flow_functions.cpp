@@ -56,7 +56,6 @@ void addFlowFunctions(Registry& r) {
         [](const Context& context, const VectorField& velocity, const Domain& region,
            const std::string& walls) {
           // Three components as grids, and three as plain numbers while they are made.
-          requireValid(region);
           requireRoom(region, 4, context);
           const ProjectionBox box = boxOf(region, wallsNamed(walls));
           return continued(withoutDivergence(velocity, box, *context.progress), box);

@@ -7,6 +7,9 @@ namespace nephele::felt {
 
 void addLevelsetFunctions(Registry& registry) {
   addCacheFunctions(registry);
+  addMeshFunctions(registry);
+  addFileFunctions(registry);
+  addGriddedCloudFunctions(registry);
   addFlowFunctions(registry);
 }
 
