@@ -104,6 +104,18 @@ ScriptParameter described(const ParameterDeclaration& parameter, const Sources& 
   return result;
 }
 
+void setGiven(std::vector<Value>& globals, const std::vector<Given>& given, const Checker& checker) {
+  for (std::size_t i = 0; i < given.size(); ++i)
+    if (checker.globals()[i].reads > 0) globals[i] = given[i].make ? given[i].make() : given[i].value;
+}
+
+void addStrings(const Expression& expression, std::vector<std::string>& found) {
+  if (expression.kind == ExpressionKind::literal && expression.literal.is<std::string>())
+    found.push_back(expression.literal.as<std::string>());
+  for (const ExpressionPtr& part : expression.parts)
+    if (part) addStrings(*part, found);
+}
+
 }  // namespace
 
 struct Program::Parts {
@@ -209,8 +221,7 @@ std::vector<Named> Program::run(Context& context, const RunOptions& options) con
   if (options.countsOperations) interpreter.keepParts();
   std::vector<Value>& globals = interpreter.globals();
   globals.resize(parts_->checker.globals().size());
-  for (std::size_t i = 0; i < parts_->given.size(); ++i)
-    globals[i] = i < options.given.size() ? options.given[i] : parts_->given[i].value;
+  setGiven(globals, options.given.empty() ? parts_->given : options.given, parts_->checker);
 
   Sources all = parts_->sources;
   Checker scope(parts_->registry);
@@ -256,9 +267,16 @@ ExpressionText::ExpressionText(const std::string& name, std::string text, const 
 
 ExpressionText::~ExpressionText() = default;
 
-Value ExpressionText::evaluate(Context& context) const {
+std::vector<std::string> ExpressionText::strings() const {
+  std::vector<std::string> found;
+  addStrings(*parts_->expression, found);
+  return found;
+}
+
+Value ExpressionText::evaluate(Context& context, const std::vector<Given>& given) const {
   Interpreter interpreter(parts_->checker, context);
-  for (const Given& one : parts_->given) interpreter.globals().push_back(one.value);
+  interpreter.globals().resize(parts_->given.size());
+  setGiven(interpreter.globals(), given.empty() ? parts_->given : given, parts_->checker);
   return tellingFaults(parts_->sources, [&] { return interpreter.evaluate(*parts_->expression); });
 }
 

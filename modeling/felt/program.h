@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -22,7 +23,9 @@ namespace nephele::felt {
 struct Given {
   std::string name;
   Type type;
-  Value value;
+  Value value{};
+  /// Makes the value of one that is dear, and is asked only where the name is read. Empty: `value` is it.
+  std::function<Value()> make{};
 };
 
 /// A variable outside of functions after a run.
@@ -51,9 +54,8 @@ struct ScriptParameter {
 struct RunOptions {
   /// Values of parameters by name, as expressions: {"gain", "2"}.
   std::map<std::string, std::string> settings{};
-  /// Values of the given names, in the order in which the program was told of them; where this is empty those
-  /// that it was told of then.
-  std::vector<Value> given{};
+  /// The given names as the program was told of them, with the values that hold now; empty: those of then.
+  std::vector<Given> given{};
   /// Counts the operations of fields.
   bool countsOperations = false;
 };
@@ -98,8 +100,11 @@ class ExpressionText {
                  const std::vector<Given>& given = {});
   ~ExpressionText();
 
+  /// `given` as the constructor was told of them, with the values that hold now; empty: those of then.
   /// @throws ScriptError; Cancelled.
-  Value evaluate(Context& context) const;
+  Value evaluate(Context& context, const std::vector<Given>& given = {}) const;
+  /// All strings in it, such as the files that it may read.
+  std::vector<std::string> strings() const;
 
  private:
   struct Parts;

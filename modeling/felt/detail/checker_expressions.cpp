@@ -70,6 +70,21 @@ std::string typesOf(const Expression& call) {
   return text + ")";
 }
 
+/// What it costs to hand `part` to a parameter: elements of an array that stands there are converted one by one.
+std::optional<int> argumentCost(const Expression& part, const Type& to) {
+  const bool isEmptyArray = part.kind == ExpressionKind::array && part.parts.empty();
+  if (isEmptyArray && to.isArray) return 0;
+  if (part.kind != ExpressionKind::array || !to.isArray || to.kind == Kind::anything)
+    return conversionCost(part.type, to);
+  int cost = 0;
+  for (const ExpressionPtr& element : part.parts) {
+    const auto step = conversionCost(element->type, to.element());
+    if (!step) return std::nullopt;
+    cost = std::max(cost, *step);
+  }
+  return cost;
+}
+
 bool isOperator(const std::string& name) {
   return name.starts_with("operator") && name.size() > 8 && !(name[8] >= 'a' && name[8] <= 'z');
 }
@@ -146,6 +161,13 @@ bool Checker::variable(Expression& expression) {
 }
 
 bool Checker::convert(ExpressionPtr& expression, const Type& to, const std::string& what) {
+  const bool isArray = expression->kind == ExpressionKind::array && to.isArray;
+  if (isArray && (expression->parts.empty() || to.kind != Kind::anything)) {
+    for (ExpressionPtr& element : expression->parts)
+      if (!convert(element, to.element(), "an element of " + what)) return false;
+    expression->type = to;
+    return true;
+  }
   const auto cost = conversionCost(expression->type, to);
   if (!cost) {
     if (expression->type.kind == Kind::nothing)
@@ -212,12 +234,7 @@ bool Checker::call(ExpressionPtr& expression) {
     int cost = 0;
     for (std::size_t i = 0; i < candidates[c].parameterCount() && cost != kNoMatch; ++i) {
       if (places[i] == kLeftOut) continue;
-      const Expression& part = *call.parts[places[i]];
-      if (part.kind == ExpressionKind::array && part.parts.empty()) {
-        if (!candidates[c].type(i).isArray) cost = kNoMatch;
-        continue;
-      }
-      const auto step = conversionCost(part.type, candidates[c].type(i));
+      const auto step = argumentCost(*call.parts[places[i]], candidates[c].type(i));
       cost = step ? cost + *step : kNoMatch;
     }
     if (cost == kNoMatch || cost > bestCost) continue;
@@ -242,7 +259,6 @@ bool Checker::call(ExpressionPtr& expression) {
   for (std::size_t i = 0; i < best->parameterCount(); ++i) {
     if (bestPlaces[i] != kLeftOut) {
       ExpressionPtr part = std::move(call.parts[bestPlaces[i]]);
-      if (part->kind == ExpressionKind::array && part->parts.empty()) part->type = best->type(i);
       if (!convert(part, best->type(i), "'" + best->name(i) + "'")) return false;
       parts.push_back(std::move(part));
     } else if (best->function != nullptr) {
