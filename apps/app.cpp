@@ -19,6 +19,7 @@
 #include "apps/wedge.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
+#include "nephele/modeling/felt/diagnostic.h"
 
 namespace nephele::apps {
 namespace {
@@ -232,6 +233,9 @@ int runVerb(const Verb& verb, const std::vector<Verb>& verbs, std::vector<std::s
     return 0;
   } catch (const CLI::ParseError& error) {
     return usageError(who, error.what());
+  } catch (const felt::ScriptError& error) {
+    std::cerr << error.what() << '\n';
+    return kUsage;
   }
 }
 

@@ -16,11 +16,12 @@ namespace nephele::apps {
 VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, FieldSources& sources, int seed,
                                          Run& run) const {
   const double longestSide = sources.longestSide();
-  const Amount most = strength.largest(longestSide);
-  if (most.value == 0 && !wind) return density;
+  const ScalarField way = sources.field(strength);
+  const float most = way.range(sources.box().expanded(float(longestSide) / 2)).max;
+  if (most == 0 && !wind) return density;
   run.begin("advect");
   VelocityArguments velocity;
-  velocity.amplitude = {most.value / steps, most.isRelative};
+  velocity.amplitude = {double(most) / steps, false};
   velocity.frequency = frequency;
   velocity.octaves = 4;
   velocity.roughness = 0.6;
@@ -31,9 +32,7 @@ VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, FieldSources& s
   run.requireMemory(estimatedAdvectionBytes(grids.bricks, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
   VectorField carrier = Vec3f{};
-  if (most.value > 0)
-    carrier = velocity.field(longestSide) *
-              (sources.field(strength) / float(most.inWorldUnits(strength.quantity.unit, longestSide)));
+  if (most > 0) carrier = velocity.field(longestSide) * (way / most);
   if (wind) carrier = carrier + windOver(sources, seed);
   return toVdb(grids, advectGrids(grids.bricks, carrier, options, run).grids).front();
 }

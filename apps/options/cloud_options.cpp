@@ -8,15 +8,6 @@
 #include "nephele/modeling/field/operations.h"
 
 namespace nephele::apps {
-namespace {
-
-void addMaskFiles(const FieldValue& value, std::vector<std::string>& files) {
-  if (value.source == FieldValue::Source::mask) files.push_back(value.path);
-  for (const FieldValue& factor : value.factors) addMaskFiles(factor, files);
-}
-
-}  // namespace
-
 double CloudArguments::voxel(double longestSide) const {
   return voxelSize.value > 0 ? voxelSize.worldUnits(longestSide) : longestSide / resolution;
 }
@@ -33,13 +24,13 @@ FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
   for (int i = 0; i < layerCount(); ++i) {
     const bool hasOwn = std::size_t(i) < recipe.size() && recipe[std::size_t(i)].amplitude;
     const FieldValue& given = hasOwn ? *recipe[std::size_t(i)].amplitude : amplitude;
-    rms += given.largestInWorldUnits(longestSide) *
-           (hasOwn ? 1 : std::pow(roughness.largestInWorldUnits(longestSide), i));
+    rms += FieldSources::bound(given, mesh, seed, run) *
+           (hasOwn ? 1 : std::pow(FieldSources::bound(roughness, mesh, seed, run), i));
   }
   return {mesh,
           {.voxelSize = voxel(longestSide),
            .reach = std::min(kHighest * rms, longestSide) +
-                    2 * double(cloudEdgeReach(float(edgeThickness.largestInWorldUnits(longestSide)),
+                    2 * double(cloudEdgeReach(float(FieldSources::bound(edgeThickness, mesh, seed, run)),
                                               float(voxel(longestSide)))),
            .seed = seed},
           run};
@@ -82,11 +73,11 @@ Extent CloudArguments::extent(Run& run) const {
 std::vector<std::string> CloudArguments::maskFiles() const {
   std::vector<std::string> files;
   for (const FieldValue* value : {&amplitude, &frequency, &lacunarity, &roughness, &billow, &billowScale})
-    addMaskFiles(*value, files);
+    files.insert(files.end(), value->files.begin(), value->files.end());
   for (const LayerRecipe& layer : recipe)
     for (const auto* value :
          {&layer.amplitude, &layer.frequency, &layer.billow, &layer.billowScale, &layer.mask})
-      if (*value) addMaskFiles(**value, files);
+      if (*value) files.insert(files.end(), (*value)->files.begin(), (*value)->files.end());
   return files;
 }
 

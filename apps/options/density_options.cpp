@@ -147,7 +147,7 @@ ScalarField DensityArguments::factor(FieldSources& sources, bool generated, std:
         .height = float(flatBase.worldUnits(longest) + (flatBase.relative ? double(shape.min.y) : 0.0)),
         .softness = float(flatBaseSoftness.worldUnits(longest))};
   const ScalarField all = densityFactor(profile);
-  return density.isConstant() && density.stops[0].amount.value == 1 ? all : all * sources.field(density);
+  return density.constant && density.constant->value == 1 ? all : all * sources.field(density);
 }
 
 void addDensityOptions(CLI::App& app, DensityArguments& arguments) {

@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "nephele/levelset/cloud/attribute_field.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/cloud/density_profile.h"
+#include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"
-#include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::apps {
@@ -43,6 +43,49 @@ std::string cornersOf(const Box& box) {
                      box.max.y, box.max.z);
 }
 
+double frameOf(const Run& run) {
+  return run.part && run.part->frame ? double(*run.part->frame) : 0.0;
+}
+
+/// The values of an attribute, wherever they are.
+ScalarField attributeRange(const Mesh& mesh, const std::string& name) {
+  Interval range{0, 0};
+  for (const MeshAttribute& attribute : mesh.attributes)
+    if (attribute.name == name && !attribute.values.empty()) {
+      const auto [low, high] = std::minmax_element(attribute.values.begin(), attribute.values.end());
+      range = {*low, *high};
+    }
+  return functionField([](const Vec3f&) { return 0.0f; }, {.range = [range](const Box&) { return range; }});
+}
+
+ScalarField madeOf(const FieldValue& value, const ShapeNames& names, double longestSide) {
+  felt::Context context;
+  context.longestSide = longestSide;
+  try {
+    return felt::ExpressionText(value.option, value.expression, {felt::Kind::scalarField}, names.registry(),
+                                names.given())
+        .evaluate(context)
+        .as<ScalarField>();
+  } catch (const felt::ScriptError& error) {
+    // Short forms have no places of their own to point at.
+    if (!value.isTypedAsExpression) throw Error(value.option + ": " + error.diagnostics().front().message);
+    throw;
+  }
+}
+
+/// Expressions may be anything; what the rest relies on is that they stay within what is allowed.
+void requireAllowed(const FieldValue& value, const Interval& range) {
+  if (!value.isTypedAsExpression) return;
+  const auto [unit, low, high, lowIsAllowed] = value.quantity;
+  const bool isFinite = std::isfinite(range.min) && std::isfinite(range.max);
+  if (isFinite && double(range.min) >= low && double(range.max) <= high &&
+      (lowIsAllowed || double(range.min) > low))
+    return;
+  throw Error(
+      fmt::format("{}: '{}' may be from {:g} to {:g}, allowed: {}; clamp(..., LOW, HIGH) keeps it within",
+                  value.option, value.text, range.min, range.max, value.quantity.allowed()));
+}
+
 }  // namespace
 
 FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run& run)
@@ -50,43 +93,50 @@ FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run&
       options_(options),
       run_(run),
       box_(run.box(boundingBox(shape))),
-      longestSide_(run.longestSide(boundingBox(shape))) {}
+      longestSide_(run.longestSide(boundingBox(shape))),
+      names_({.along = [this](const Vec3f& direction) { return along(direction); },
+              .facing = [this](const Vec3f& direction) { return facing(direction); },
+              .mask = [this](const std::string& path, const std::string& grid) { return mask(path, grid); },
+              .attribute = [this](const std::string& name,
+                                  bool hasSpheres) { return attribute(name, hasSpheres); },
+              .time = frameOf(run),
+              .seed = options.seed}) {}
 
 ScalarField FieldSources::field(const FieldValue& value) {
-  ScalarField result = rampOf(value);
-  for (const FieldValue& factor : value.factors) result = result * field(factor);
-  return result;
+  if (value.constant) return float(value.constant->inWorldUnits(value.quantity.unit, longestSide_));
+  option_ = value.option;
+  const ScalarField result = madeOf(value, names_, longestSide_);
+  if (!value.isTypedAsExpression) return result;
+  const Interval range = result.range(box_.expanded(float(options_.reach)));
+  requireAllowed(value, range);
+  // Far away, where nobody asks, it may be anything; what grows layers wants bounds for all of space.
+  return std::isfinite(result.range(Box::everywhere()).magnitude()) ? result : clamp(result, range.min, range.max);
 }
 
-ScalarField FieldSources::rampOf(const FieldValue& value) {
-  std::vector<RampStop> stops;
-  for (const FieldValue::Stop& stop : value.stops)
-    stops.push_back({float(stop.at), float(stop.amount.inWorldUnits(value.quantity.unit, longestSide_))});
-  if (value.source == FieldValue::Source::constant) return stops.front().value;
-  try {
-    return ramp(placesOf(value), stops);
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", value.option, error.what()));
-  }
+double FieldSources::bound(const FieldValue& value, const Mesh& mesh, int seed, const Run& run) {
+  const Box box = run.box(boundingBox(mesh));
+  const double longestSide = run.longestSide(boundingBox(mesh));
+  if (value.constant) return value.constant->inWorldUnits(value.quantity.unit, longestSide);
+  const auto share = [](float lowest) {
+    return functionField([](const Vec3f&) { return 0.0f; }, {.range = [lowest](const Box&) {
+                           return Interval{lowest, 1};
+                         }});
+  };
+  const ShapeNames names(
+      {.along = [&](const Vec3f&) { return share(0); },
+       .facing = [&](const Vec3f&) { return share(-1); },
+       .mask = [&](const std::string&, const std::string&) { return share(0); },
+       .attribute = [&](const std::string& name, bool) { return attributeRange(mesh, name); },
+       .time = frameOf(run),
+       .seed = seed});
+  const Interval range = madeOf(value, names, longestSide).range(box.expanded(float(longestSide) / 2));
+  requireAllowed(value, range);
+  return double(range.max);
 }
 
-ScalarField FieldSources::placesOf(const FieldValue& value) {
-  using Source = FieldValue::Source;
-  if (value.source == Source::along) return along(value.direction);
-  if (value.source == Source::noise) return noise(value);
-  const Vec3f& d = value.direction;
-  const std::string key =
-      value.source == Source::facing ? fmt::format("facing {} {} {}", d.x, d.y, d.z)
-      : value.source == Source::mask
-          ? "mask " + value.path + "\n" + value.grid
-          : fmt::format("attribute {} {}", value.hasSpheres ? "spheres" : "closest", value.attribute);
+ScalarField FieldSources::once(const std::string& key, const std::function<ScalarField()>& make) {
   if (const auto found = made_.find(key); found != made_.end()) return found->second;
-  const ScalarField made = value.source == Source::facing ? facing(d)
-                           : value.source == Source::mask ? mask(value)
-                                                          : attribute(value);
-  return made_.emplace(key, made).first->second;
+  return made_.emplace(key, make()).first->second;
 }
 
 ScalarField FieldSources::along(const Vec3f& direction) const {
@@ -100,50 +150,48 @@ ScalarField FieldSources::along(const Vec3f& direction) const {
   return plane(direction * float(low), direction) / float(high - low);
 }
 
-ScalarField FieldSources::noise(const FieldValue& value) const {
-  constexpr float kRms = 1.5f;
-  const auto frequency = float(value.frequency.inWorldUnits(Quantity::Unit::frequency, longestSide_));
-  return smoothstep(
-      -kRms, kRms,
-      fractalSum({.octaves = value.octaves, .frequency = frequency, .seed = std::uint32_t(options_.seed)}));
-}
-
 ScalarField FieldSources::facing(const Vec3f& direction) {
-  run_.begin("directions");
-  return facingField(
-      shape_, direction,
-      {.voxelSize = lookUpVoxel(options_.voxelSize, longestSide_), .band = float(options_.reach)}, run_);
+  return once(fmt::format("facing {} {} {}", direction.x, direction.y, direction.z), [&] {
+    run_.begin("directions");
+    return facingField(
+        shape_, direction,
+        {.voxelSize = lookUpVoxel(options_.voxelSize, longestSide_), .band = float(options_.reach)}, run_);
+  });
 }
 
-ScalarField FieldSources::mask(const FieldValue& value) {
-  const VdbGrid grid = readScalarGrid(value.path, value.grid);
-  const VdbGridInfo info = describe(grid);
-  const auto bricks = namingFile(value.path, [&] { return toBricks(grid); });
-  const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
-  const Box shape = boundingBox(shape_), active = activeBox(info, bricks->indexToWorld()),
-            common = active.intersection(shape);
-  const std::string outside = fmt::format("; outside its grid it counts as {:g}",
-                                          isLevelSet ? 0.0 : std::clamp(bricks->background(), 0.0f, 1.0f));
-  if (common.isEmpty())
-    run_.note(fmt::format(
-        "warning: {}: mask {}: grid '{}' has no active voxel near the shape: it holds {}, the shape {}{}",
-        value.option, value.path, info.name, active.isEmpty() ? "none" : cornersOf(active), cornersOf(shape),
-        outside));
-  else if (const double share = volumeOf(common) / volumeOf(shape); share < 0.995)
-    run_.note(fmt::format("{}: mask {}: the active voxels of grid '{}' span {:.0f} % of the shape's box{}",
-                          value.option, value.path, info.name, 100 * share, outside));
-  const ScalarField field = gridField(bricks);
-  return isLevelSet ? smoothstep(-bricks->voxelSize(), bricks->voxelSize(), field) : field;
+ScalarField FieldSources::mask(const std::string& path, const std::string& gridName) {
+  return once("mask " + path + "\n" + gridName, [&] {
+    const VdbGrid grid = readScalarGrid(path, gridName);
+    const VdbGridInfo info = describe(grid);
+    const auto bricks = namingFile(path, [&] { return toBricks(grid); });
+    const bool isLevelSet = info.gridClass == VdbGridInfo::Class::levelSet;
+    const Box shape = boundingBox(shape_), active = activeBox(info, bricks->indexToWorld()),
+              common = active.intersection(shape);
+    const std::string outside = fmt::format("; outside its grid it counts as {:g}",
+                                            isLevelSet ? 0.0 : std::clamp(bricks->background(), 0.0f, 1.0f));
+    if (common.isEmpty())
+      run_.note(fmt::format(
+          "warning: {}: mask {}: grid '{}' has no active voxel near the shape: it holds {}, the shape {}{}",
+          option_, path, info.name, active.isEmpty() ? "none" : cornersOf(active), cornersOf(shape),
+          outside));
+    else if (const double share = volumeOf(common) / volumeOf(shape); share < 0.995)
+      run_.note(fmt::format("{}: mask {}: the active voxels of grid '{}' span {:.0f} % of the shape's box{}",
+                            option_, path, info.name, 100 * share, outside));
+    const ScalarField field = gridField(bricks);
+    return isLevelSet ? smoothstep(-bricks->voxelSize(), bricks->voxelSize(), field) : clamp(field, 0, 1);
+  });
 }
 
-ScalarField FieldSources::attribute(const FieldValue& value) {
-  run_.begin("attribute " + value.attribute);
-  using Spread = AttributeFieldOptions::Spread;
-  return attributeField(shape_, value.attribute,
-                        {.spread = value.hasSpheres ? Spread::spheres : Spread::closest,
-                         .voxelSize = lookUpVoxel(options_.voxelSize, longestSide_),
-                         .band = float(options_.reach)},
-                        run_);
+ScalarField FieldSources::attribute(const std::string& name, bool hasSpheres) {
+  return once(fmt::format("attribute {} {}", hasSpheres ? "spheres" : "closest", name), [&] {
+    run_.begin("attribute " + name);
+    using Spread = AttributeFieldOptions::Spread;
+    return attributeField(shape_, name,
+                          {.spread = hasSpheres ? Spread::spheres : Spread::closest,
+                           .voxelSize = lookUpVoxel(options_.voxelSize, longestSide_),
+                           .band = float(options_.reach)},
+                          run_);
+  });
 }
 
 }  // namespace nephele::apps

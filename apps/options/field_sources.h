@@ -1,10 +1,12 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
 #include "apps/app.h"
 #include "apps/options/field_value.h"
+#include "apps/options/shape_names.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/field/field.h"
 
@@ -25,6 +27,8 @@ class FieldSources {
 
   /// Keeps references to both. `shape` must be triangulated.
   FieldSources(const Mesh& shape, const Options& options, const Run& run);
+  FieldSources(const FieldSources&) = delete;
+  FieldSources& operator=(const FieldSources&) = delete;
 
   /// Of the shape; in a sequence of the largest, and the box around all.
   double longestSide() const { return longestSide_; }
@@ -33,19 +37,23 @@ class FieldSources {
 
   /// `value` in world units everywhere: its range is that of its stops at most. Noise goes from one stop to
   /// the other between -1.5 and 1.5 times its rms; values with noise of one frequency vary together. Masks
-  /// and attributes below 0 or above 1 count as 0 and 1; of a level set the inside is 1 and the outside 0,
-  /// smooth over two voxels. Notes where a mask covers the shape in part or not at all.
-  /// @throws Error naming the option: a file or grid that cannot be read, an attribute that is not there.
+  /// below 0 or above 1 count as 0 and 1, and so do attributes in short forms; of a level set the inside is 1
+  /// and the outside 0, smooth over two voxels. Notes where a mask covers the shape in part or not at all.
+  /// @throws Error naming the option: a file or grid that cannot be read, an attribute that is not there, an
+  /// expression that may leave what is allowed.
   ScalarField field(const FieldValue& value);
 
+  /// What `value` is at most in and around the shape `mesh`, world units, without looking anything up. A
+  /// bound, not the least one. @throws Error naming the option where there is none.
+  static double bound(const FieldValue& value, const Mesh& mesh, int seed, const Run& run);
+
  private:
-  ScalarField rampOf(const FieldValue& value);
-  ScalarField placesOf(const FieldValue& value);
-  ScalarField noise(const FieldValue& value) const;
   ScalarField along(const Vec3f& direction) const;
   ScalarField facing(const Vec3f& direction);
-  ScalarField mask(const FieldValue& value);
-  ScalarField attribute(const FieldValue& value);
+  ScalarField mask(const std::string& path, const std::string& grid);
+  ScalarField attribute(const std::string& name, bool hasSpheres);
+  /// What is kept under `key`, made by `make` where it is not there.
+  ScalarField once(const std::string& key, const std::function<ScalarField()>& make);
 
   const Mesh& shape_;
   Options options_;
@@ -53,6 +61,9 @@ class FieldSources {
   Box box_;
   double longestSide_ = 0;
   std::map<std::string, ScalarField> made_;
+  /// The option whose value is being made, for messages.
+  std::string option_;
+  ShapeNames names_;
 };
 
 }  // namespace nephele::apps

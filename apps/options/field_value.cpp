@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/options/shape_names.h"
 #include "nephele/levelset/io/vdb_io.h"
 
 namespace nephele::apps {
 namespace {
 
 constexpr double kFarthestPlace = 1e6;
-constexpr int kMostOctaves = 8;
+constexpr int kOctaves = 3, kMostOctaves = 8;
 // What fields may be multiplied by.
 constexpr Quantity kFactor{Quantity::Unit::number, 0, 1e6};
 
@@ -38,6 +39,34 @@ std::vector<std::string> listed(const std::string& text) {
   return parts;
 }
 
+/// As Felt has it, so that it is read as the same number.
+std::string literal(double value) {
+  const std::string text = fmt::format("{}", std::abs(value));
+  return value < 0 ? "-" + text : text;
+}
+
+std::string literal(const Amount& amount, Quantity::Unit unit) {
+  const char* mark = !amount.isRelative ? "" : unit == Quantity::Unit::length ? "%" : "x";
+  return literal(amount.value) + mark;
+}
+
+std::string quotedLiteral(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    if (c == '\n')
+      result += "\\n";
+    else
+      result += c;
+  }
+  return result + "\"";
+}
+
+std::string vectorLiteral(const Vec3f& v) {
+  return fmt::format("({}, {}, {})", literal(double(v.x)), literal(double(v.y)), literal(double(v.z)));
+}
+
+/// Reads the short forms and says what they are in Felt.
 class Parser {
  public:
   Parser(const std::string& option, const std::string& text, const Quantity& quantity) {
@@ -48,44 +77,47 @@ class Parser {
 
   FieldValue parsed() {
     const auto [text, factors] = splitFirst(value_.text, '*');
-    readOne(text);
-    if (value_.text.find('*') != std::string::npos)
-      value_.factors.push_back(parseFieldValue(value_.option, factors, kFactor));
+    value_.expression = one(text);
+    if (value_.text.find('*') != std::string::npos) {
+      const FieldValue others = parseFieldValue(value_.option, factors, kFactor);
+      if (value_.constant && others.constant)
+        value_.constant->value *= others.constant->value;
+      else
+        value_.constant.reset();
+      value_.expression += " * " + others.expression;
+      value_.files.insert(value_.files.end(), others.files.begin(), others.files.end());
+    }
     return value_;
   }
 
  private:
-  void readOne(const std::string& text) {
-    using Source = FieldValue::Source;
+  struct Stop {
+    double at;
+    Amount amount;
+  };
+  using Stops = std::vector<Stop>;
+
+  std::string one(const std::string& text) {
     if (text.find(':') == std::string::npos) {
-      value_.stops = {{0, amount(text)}};
-      return;
+      value_.constant = amount(text);
+      return literal(*value_.constant, value_.quantity.unit);
     }
     const auto [word, rest] = splitFirst(text, ':');
-    if (word == "height") {
-      value_.source = Source::along;
-      readRamp(rest, -kFarthestPlace, kFarthestPlace);
-    } else if (word == "along" || word == "facing") {
-      value_.source = word == "along" ? Source::along : Source::facing;
+    if (word == "height")
+      return ramp("along((0.0, 1.0, 0.0), false)", rises(rest, -kFarthestPlace, kFarthestPlace));
+    if (word == "along" || word == "facing") {
       const auto [direction, stops] = splitFirst(rest, ':');
-      readDirection(word, direction);
-      const double farthest = word == "along" ? kFarthestPlace : 1;
-      readRamp(stops, -farthest, farthest);
-    } else if (word == "mask") {
-      value_.source = Source::mask;
-      readMask(rest);
-    } else if (word == "attribute") {
-      value_.source = Source::attribute;
-      readAttribute(rest);
-    } else if (word == "noise") {
-      value_.source = Source::noise;
-      readNoise(rest);
-    } else {
-      const std::string meant =
-          closestWord(word, {"height", "along", "facing", "mask", "attribute", "noise"});
-      refuse(value_.quantity.allowed() + ", or height:, along:, facing:, mask:, attribute: or noise:" +
-             (meant.empty() ? "" : "; did you mean " + meant + ":?"));
+      const std::string vector = vectorLiteral(directionOf(word, direction));
+      if (word == "facing") return ramp("facing(" + vector + ")", rises(stops, -1, 1));
+      return ramp("along(" + vector + ", false)", rises(stops, -kFarthestPlace, kFarthestPlace));
     }
+    if (word == "mask") return mask(rest);
+    if (word == "attribute") return attribute(rest);
+    if (word == "noise") return noise(rest);
+    const std::string meant = closestWord(word, {"height", "along", "facing", "mask", "attribute", "noise"});
+    refuse(value_.quantity.allowed() +
+           ", height:, along:, facing:, mask:, attribute: or noise:, or an expression after =" +
+           (meant.empty() ? "" : "; did you mean " + meant + ":?"));
   }
 
   [[noreturn]] void refuse(const std::string& allowed) const {
@@ -94,6 +126,16 @@ class Parser {
 
   [[noreturn]] void refusePart(const std::string& part, const std::string& allowed) const {
     refuse(part == value_.text ? allowed : fmt::format("in place of '{}' {}", part, allowed));
+  }
+
+  /// The polyline through the stops.
+  std::string ramp(const std::string& place, const Stops& stops) const {
+    std::string places, values;
+    for (const Stop& stop : stops) {
+      places += (places.empty() ? "" : ", ") + literal(stop.at);
+      values += (values.empty() ? "" : ", ") + literal(stop.amount, value_.quantity.unit);
+    }
+    return fmt::format("ramp({}, [{}], [{}])", place, places, values);
   }
 
   Amount amount(const std::string& part) const {
@@ -110,7 +152,7 @@ class Parser {
     return amount;
   }
 
-  void readDirection(const std::string& word, const std::string& part) {
+  Vec3f directionOf(const std::string& word, const std::string& part) const {
     const std::vector<std::string> parts = listed(part);
     const std::string form = "a direction X,Y,Z that is not 0, as in " + word + ":0,1,0:...";
     if (parts.size() != 3) refusePart(part, form);
@@ -122,10 +164,11 @@ class Parser {
     }
     const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     if (!(length > 1e-30 && length < 1e30)) refusePart(part, form);
-    value_.direction = {float(d[0] / length), float(d[1] / length), float(d[2] / length)};
+    return {float(d[0] / length), float(d[1] / length), float(d[2] / length)};
   }
 
-  void readRamp(const std::string& text, double lowest, double highest) {
+  Stops rises(const std::string& text, double lowest, double highest) const {
+    Stops stops;
     for (const std::string& part : listed(text)) {
       const auto [at, stop] = splitFirst(part, '=');
       if (part.find('=') == std::string::npos)
@@ -133,65 +176,78 @@ class Parser {
       const auto place = parseNumber(at);
       if (!place || *place < lowest || *place > highest)
         refusePart(part, fmt::format("a stop at a place from {:g} to {:g}", lowest, highest));
-      if (!value_.stops.empty() && *place < value_.stops.back().at)
-        refusePart(part,
-                   fmt::format("places that rise: {:g} comes after {:g}", *place, value_.stops.back().at));
-      value_.stops.push_back({*place, amount(stop)});
+      if (!stops.empty() && *place < stops.back().at)
+        refusePart(part, fmt::format("places that rise: {:g} comes after {:g}", *place, stops.back().at));
+      stops.push_back({*place, amount(stop)});
     }
-    if (value_.stops.size() < 2) refusePart(text, "two stops or more");
+    if (stops.size() < 2) refusePart(text, "two stops or more");
+    return stops;
   }
 
-  void readTwo(const std::string& part) {
+  Stops two(const std::string& part) const {
     const std::vector<std::string> parts = listed(part);
     if (parts.size() != 2)
       refusePart(part,
                  fmt::format("two values {0},{0}: where it is 0, and where it is 1", value_.quantity.word()));
-    value_.stops = {{0, amount(parts[0])}, {1, amount(parts[1])}};
+    return {{0, amount(parts[0])}, {1, amount(parts[1])}};
   }
 
-  void readMask(const std::string& rest) {
+  std::string mask(const std::string& rest) {
     const auto [where, values] = splitLast(rest, ':');
-    value_.path = where;
+    std::string path = where, grid;
     // The path itself may hold colons.
-    if (!isVolumeFile(where)) std::tie(value_.path, value_.grid) = splitLast(where, ':');
-    if (!isVolumeFile(value_.path) || rest.find(':') == std::string::npos)
+    if (!isVolumeFile(where)) std::tie(path, grid) = splitLast(where, ':');
+    if (!isVolumeFile(path) || rest.find(':') == std::string::npos)
       refuse(fmt::format("mask:FILE.vdb:{0},{0} or mask:FILE.vdb:GRID:{0},{0}", value_.quantity.word()));
-    readTwo(values);
+    value_.files.push_back(path);
+    return ramp(fmt::format("mask({}, {})", quotedLiteral(path), quotedLiteral(grid)), two(values));
   }
 
-  void readAttribute(const std::string& rest) {
-    const auto [name, values] = splitLast(rest, ':');
-    value_.attribute = name;
+  std::string attribute(const std::string& rest) const {
+    const auto [typed, values] = splitLast(rest, ':');
+    std::string name = typed;
     const auto [before, last] = splitLast(name, ':');
-    if (last == "spheres") {
-      value_.attribute = before;
-      value_.hasSpheres = true;
-    }
-    if (value_.attribute.empty() || rest.find(':') == std::string::npos)
+    const bool hasSpheres = last == "spheres";
+    if (hasSpheres) name = before;
+    if (name.empty() || rest.find(':') == std::string::npos)
       refuse(fmt::format("attribute:NAME:{0},{0} or attribute:NAME:spheres:{0},{0}", value_.quantity.word()));
-    readTwo(values);
+    return ramp(fmt::format("attribute({}{})", quotedLiteral(name), hasSpheres ? ", \"spheres\"" : ""),
+                two(values));
   }
 
-  void readNoise(const std::string& rest) {
+  std::string noise(const std::string& rest) const {
     const auto [noise, values] = splitFirst(rest, ':');
     const std::vector<std::string> parts = listed(noise);
     const std::string frequency = parts.front();
-    value_.frequency.isRelative = frequency.ends_with('x');
-    const auto number =
-        parseNumber(frequency.substr(0, frequency.size() - (value_.frequency.isRelative ? 1 : 0)));
-    const auto octaves = parts.size() > 1 ? parseNumber(parts[1]) : std::optional<double>(value_.octaves);
+    const bool isRelative = frequency.ends_with('x');
+    const auto number = parseNumber(frequency.substr(0, frequency.size() - (isRelative ? 1 : 0)));
+    const auto octaves = parts.size() > 1 ? parseNumber(parts[1]) : std::optional<double>(kOctaves);
     if (parts.size() > 2 || !number || !(*number > 0 && *number <= 1e6) || !octaves ||
         !(*octaves >= 1 && *octaves <= kMostOctaves) || *octaves != std::floor(*octaves))
       refusePart(noise, fmt::format("a frequency above 0 (2.5 or 6x), and octaves from 1 to {}, as in "
                                     "noise:3x,2:0.5,1",
                                     kMostOctaves));
-    value_.frequency.value = *number;
-    value_.octaves = int(*octaves);
-    readTwo(values);
+    const std::string place =
+        fmt::format("smoothstep(-1.5, 1.5, fractalsum({}, {}, seed = seed))", int(*octaves),
+                    literal({*number, isRelative}, Quantity::Unit::frequency));
+    return ramp(place, two(values));
   }
 
   FieldValue value_;
 };
+
+/// Expressions as typed; their faults are told by the language.
+FieldValue parsedExpression(const std::string& option, const std::string& text, const Quantity& quantity) {
+  FieldValue value{.quantity = quantity, .option = option, .text = text};
+  value.expression = text.substr(1);
+  value.isTypedAsExpression = true;
+  static const ShapeNames names;
+  const felt::ExpressionText checked(option, value.expression, {felt::Kind::scalarField}, names.registry(),
+                                     names.given());
+  for (const std::string& string : checked.strings())
+    if (isVolumeFile(string)) value.files.push_back(string);
+  return value;
+}
 
 }  // namespace
 
@@ -218,16 +274,8 @@ double Amount::inWorldUnits(Quantity::Unit unit, double longestSide) const {
   return unit == Quantity::Unit::length ? value * 0.01 * longestSide : value / longestSide;
 }
 
-Amount FieldValue::largest(double longestSide) const {
-  Amount result = std::max_element(stops.begin(), stops.end(), [&](const Stop& a, const Stop& b) {
-                    return a.amount.inWorldUnits(quantity.unit, longestSide) <
-                           b.amount.inWorldUnits(quantity.unit, longestSide);
-                  })->amount;
-  for (const FieldValue& factor : factors) result.value *= factor.largest(longestSide).value;
-  return result;
-}
-
 FieldValue parseFieldValue(const std::string& option, const std::string& text, const Quantity& quantity) {
+  if (text.starts_with('=')) return parsedExpression(option, text, quantity);
   return Parser(option, text, quantity).parsed();
 }
 
@@ -252,7 +300,9 @@ std::string fieldValueHelp() {
          "  attribute:NAME[:spheres]:VALUE,VALUE  where a vertex attribute of the mesh is 0, and where it is "
          "1\n"
          "  noise:FREQUENCY[,OCTAVES]:VALUE,VALUE where smooth noise is low, and where it is high\n"
-         "  FIELD*FIELD[*...]                     their product; all but the first are numbers\n";
+         "  FIELD*FIELD[*...]                     their product; all but the first are numbers\n"
+         "  =EXPRESSION                           anything else, of P, height, normal, facing(DIRECTION), "
+         "mask(\"FILE\"), attribute(\"NAME\"), time, seed; see docs/felt.md\n";
 }
 
 }  // namespace nephele::apps

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,47 +38,22 @@ struct Amount {
 
 /// A parameter as typed: one value, or one that varies in space. docs/cloud.md describes the forms.
 struct FieldValue {
-  enum class Source {
-    constant,
-    along,      ///< A ramp along `direction` over the box of the shape; "height" is one along y.
-    facing,     ///< A ramp over the cosine between the surface's normal and `direction`.
-    mask,       ///< A ramp over a grid.
-    attribute,  ///< A ramp over a vertex attribute of the mesh.
-    noise       ///< A ramp over smooth noise, see FieldSources.
-  };
-  struct Stop {
-    double at = 0;
-    Amount amount;
-  };
-
-  Source source = Source::constant;
   Quantity quantity{};
   /// What it was given to ("--amplitude", "cloud.toml:7: amplitude") and the value as typed, for messages.
   std::string option{}, text{};
-  /// One for a constant; else in rising order.
-  std::vector<Stop> stops{};
-  Vec3f direction{0, 1, 0};
-  /// Of a mask: the file, and the name of the grid or "" for the first that fits.
-  std::string path{}, grid{};
-  /// Of an attribute.
-  std::string attribute{};
-  bool hasSpheres = false;
-  /// Of noise.
-  Amount frequency{};
-  int octaves = 3;
-  /// Numbers that multiply it.
-  std::vector<FieldValue> factors{};
-
-  bool isConstant() const { return source == Source::constant && factors.empty(); }
-  /// The largest of its values on a shape with this longest side, or more where there are factors.
-  Amount largest(double longestSide) const;
-  double largestInWorldUnits(double longestSide) const {
-    return largest(longestSide).inWorldUnits(quantity.unit, longestSide);
-  }
+  /// The same in Felt, of which all other forms are short for something.
+  std::string expression{};
+  /// Where it is the same everywhere.
+  std::optional<Amount> constant{};
+  /// Whether it was typed as an expression, so that what it may be shows only when it is made.
+  bool isTypedAsExpression = false;
+  /// Files that it may read.
+  std::vector<std::string> files{};
 };
 
 /// Reads `text`, the value given to `option`. @throws CLI::ValidationError naming the option, the text and
-/// what is allowed in place of the part that does not fit.
+/// what is allowed in place of the part that does not fit; felt::ScriptError with the faults of an
+/// expression.
 FieldValue parseFieldValue(const std::string& option, const std::string& text, const Quantity& quantity);
 
 /// A parameter that may vary; the target's value at the call is the default that --help shows.

@@ -193,10 +193,10 @@ void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, F
   if (recipe.billowScale) layer.billowScale = sources.field(*recipe.billowScale);
   if (recipe.mask) layer.amplitude = layer.amplitude * sources.field(*recipe.mask);
   if (recipe.direction) {
-    FieldValue growth{.source = FieldValue::Source::facing,
-                      .option = recipe.place + ": direction",
-                      .stops = {{-1, {1 - recipe.bias}}, {1, {1}}},
-                      .direction = *recipe.direction};
+    const Vec3f& d = *recipe.direction;
+    const FieldValue growth = parseFieldValue(
+        recipe.place + ": direction",
+        fmt::format("facing:{},{},{}:-1={},1=1", d.x, d.y, d.z, 1 - recipe.bias), {.low = 0, .high = 1});
     layer.amplitude = layer.amplitude * sources.field(growth);
   }
 }

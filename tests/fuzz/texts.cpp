@@ -127,9 +127,13 @@ void useFieldTexts(const Input& input) {
   using Unit = apps::Quantity::Unit;
   const Unit unit = input.hash % 3 == 0 ? Unit::number : input.hash % 3 == 1 ? Unit::length : Unit::frequency;
   mayFail("--value", [&] {
-    const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
-    apps::FieldSources fields = sources(run);
-    sample(fields.field(value));
+    try {
+      const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
+      apps::FieldSources fields = sources(run);
+      sample(fields.field(value));
+    } catch (const felt::ScriptError&) {
+      // Of several lines, by a printer of its own.
+    }
   });
   // A file is named by itself.
   mayFail(isVolumeFile(text) ? printable(text) : "--velocity", [&] {

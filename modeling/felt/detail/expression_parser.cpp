@@ -245,7 +245,7 @@ ExpressionPtr ExpressionParser::primary() {
     case TokenKind::perSide: {
       take();
       ExpressionPtr result =
-          literal(token, token.kind == TokenKind::percent ? token.number / 100 : token.number, Kind::number);
+          literal(token, token.kind == TokenKind::percent ? token.number * 0.01 : token.number, Kind::number);
       result->kind = token.kind == TokenKind::percent ? ExpressionKind::percent : ExpressionKind::perSide;
       return result;
     }

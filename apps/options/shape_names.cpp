@@ -1,0 +1,68 @@
+#include "apps/options/shape_names.h"
+
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+
+namespace nephele::apps {
+
+namespace {
+
+Vec3f unit(const Vec3d& direction) {
+  const double length = nephele::length(direction);
+  if (!(length > 1e-30 && length < 1e30)) throw Error("the direction must not be 0");
+  return felt::toFloat(direction / length);
+}
+
+bool isSpheres(const std::string& how) {
+  if (how != "closest" && how != "spheres")
+    throw felt::CallError(felt::Code::outOfRange, "there is no way '" + how + "' to spread an attribute",
+                          "\"closest\" or \"spheres\"");
+  return how == "spheres";
+}
+
+}  // namespace
+
+ShapeNames::ShapeNames(ShapeLookUps lookUps) : registry_(std::make_unique<felt::Registry>()) {
+  felt::Registry& r = *registry_;
+  felt::addModelingFunctions(r);
+  r.group("the shape");
+  r.add("scalarfield along(vector direction, bool clamped = true)",
+        "0 where the shape begins in this direction, 1 where it ends, and so beyond, unless it is not "
+        "clamped and goes on "
+        "in proportion.",
+        "ramp(along((1,0,0)), [0, 1], [1%, 3%])",
+        [along = lookUps.along](const Vec3d& direction, bool clamped) {
+          const ScalarField way = along(unit(direction));
+          return clamped ? clamp(way, 0, 1) : way;
+        });
+  r.add("scalarfield facing(vector direction)",
+        "Cosine between the surface's normal and the direction: 1 where it faces that way, -1 where it faces "
+        "away.",
+        "ramp(facing((0,1,0)), [-1, 1], [0, 3%])",
+        [facing = lookUps.facing](const Vec3d& direction) { return facing(unit(direction)); });
+  r.add("scalarfield mask(string path, string grid = \"\")",
+        "A grid of a volume file as 0 to 1; of a level set the inside is 1, with an edge of two voxels.",
+        "3% * mask(\"mask.vdb\")",
+        [mask = lookUps.mask](const std::string& path, const std::string& grid) { return mask(path, grid); });
+  r.add("scalarfield attribute(string name, string how = \"closest\")",
+        "A vertex attribute of the mesh: of the closest point of the surface, or blended by \"spheres\".",
+        "lerp(1%, 3%, attribute(\"growth\"))",
+        [attribute = lookUps.attribute](const std::string& name, const std::string& how) {
+          return attribute(name, isSpheres(how));
+        });
+  const auto normal = [facing = lookUps.facing]() -> felt::Value {
+    return normalize(vectorField(facing({1, 0, 0}), facing({0, 1, 0}), facing({0, 0, 1})));
+  };
+  given_ = {{"P", {felt::Kind::vectorField}, identity()},
+            {"height",
+             {felt::Kind::scalarField},
+             {},
+             [along = lookUps.along] {
+               return felt::Value(along({0, 1, 0}));
+             }},
+            {"normal", {felt::Kind::vectorField}, {}, normal},
+            {"time", {felt::Kind::number}, lookUps.time},
+            {"seed", {felt::Kind::integer}, std::int64_t(lookUps.seed)}};
+}
+
+}  // namespace nephele::apps
