@@ -2,8 +2,13 @@
 #include <fmt/format.h>
 
 #include "apps/options/cut_options.h"
+#include "apps/options/expression_names.h"
 #include "nephele/levelset/cut/cut_input.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/point_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/shape/combinations.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::apps {
 namespace {
@@ -11,6 +16,23 @@ namespace {
 std::string planeText(const BladePlane& plane) {
   const auto &p = plane.point, &n = plane.normal;
   return fmt::format("{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z);
+}
+
+/// The part of space around `box` where `blade` is positive, as a closed mesh.
+Mesh solidOf(const ScalarField& blade, const std::string& text, const Box& box, double voxelSize, Run& run) {
+  const auto voxel = float(voxelSize);
+  // Its walls stand outside of what is cut.
+  const Box room = box.expanded(0.05f * box.longestSide() + 4 * voxel);
+  const ScalarField solid = intersection(blade, nephele::box(room));
+  const Mesh mesh = marchingCubes(
+      *bakeGrid(solid, {.voxelSize = voxel, .box = room.expanded(2 * voxel), .band = {-3 * voxel, 3 * voxel}},
+                run),
+      0.0f, run);
+  if (mesh.faceCount() == 0 ||
+      signedVolume(mesh) > 0.9999 * double(room.size().x) * double(room.size().y) * double(room.size().z))
+    throw Error(fmt::format("--knife: '{}' is {} everywhere in the shape's box: it has no blade there", text,
+                            mesh.faceCount() == 0 ? "negative" : "positive"));
+  return mesh;
 }
 
 }  // namespace
@@ -44,9 +66,22 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
                              .octaves = a.octaves}});
   }
   for (const std::string& path : a.knifeFiles) {
+    if (path.starts_with('=')) continue;
     run.begin("knife");
     result.names.push_back("file " + path);
     knives.solids.push_back(readSolid(path, a.repair, run));
+  }
+  result.voxelSize = a.voxelSize.value > 0 ? a.voxelSize.worldUnits(side) : side / a.resolution;
+  if (a.voxelSize.value == 0 && a.resolutionOption->count() == 0 && parts[0].level)
+    result.voxelSize = double(parts[0].level->voxelSize());
+  for (const std::string& text : a.knifeFiles) {
+    if (!text.starts_with('=')) continue;
+    run.begin("knife");
+    result.names.push_back("expression " + text.substr(1));
+    const ScalarField blade =
+        evaluated("--knife", text.substr(1), {felt::Kind::scalarField}, namesOfPlace(0, a.seed), side)
+            .as<ScalarField>();
+    knives.solids.push_back(solidOf(blade, text, box, result.voxelSize, run));
   }
   if (a.cellCount > 0) {
     run.begin("scatter");
@@ -67,9 +102,6 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     for (const CutPart& part : parts) whole += signedVolume(part.mesh);
     result.options.minVolume = a.minVolume->worldUnits(whole);
   }
-  result.voxelSize = a.voxelSize.value > 0 ? a.voxelSize.worldUnits(side) : side / a.resolution;
-  if (a.voxelSize.value == 0 && a.resolutionOption->count() == 0 && parts[0].level)
-    result.voxelSize = double(parts[0].level->voxelSize());
   return result;
 }
 

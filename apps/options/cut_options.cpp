@@ -1,6 +1,7 @@
 #include "apps/options/cut_options.h"
 
 #include "apps/options/cut_quantities.h"
+#include "apps/options/expression_names.h"
 
 namespace nephele::apps {
 namespace {
@@ -39,7 +40,12 @@ void addCutOptions(CLI::App& app, CutArguments& a) {
            "Sizes of hills: each half as large and half as high as the one before.")
       ->needs(roughness);
   addInputs(app, "--knife", a.knifeFiles,
-            "Cut by the surface of a closed mesh or a level set (.vdb); may be given again.");
+            "Cut by the surface of a closed mesh or a level set (.vdb), or where =EXPRESSION of P is 0; may "
+            "be given again.")
+      ->each([](const std::string& text) {
+        if (text.starts_with('='))
+          checkedExpression("--knife", text.substr(1), {felt::Kind::scalarField}, namesOfPlace(0, 0));
+      });
   auto* voronoi = addCount(app, "--voronoi", a.cellCount, 1, 1000000,
                            "Cut into the Voronoi cells of this many points, scattered inside.")
                       ->default_str("");

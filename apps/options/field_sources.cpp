@@ -58,13 +58,9 @@ ScalarField attributeRange(const Mesh& mesh, const std::string& name) {
   return functionField([](const Vec3f&) { return 0.0f; }, {.range = [range](const Box&) { return range; }});
 }
 
-ScalarField madeOf(const FieldValue& value, const ShapeNames& names, double longestSide) {
-  felt::Context context;
-  context.longestSide = longestSide;
+ScalarField madeOf(const FieldValue& value, const ExpressionNames& names, double longestSide) {
   try {
-    return felt::ExpressionText(value.option, value.expression, {felt::Kind::scalarField}, names.registry(),
-                                names.given())
-        .evaluate(context)
+    return evaluated(value.option, value.expression, {felt::Kind::scalarField}, names, longestSide)
         .as<ScalarField>();
   } catch (const felt::ScriptError& error) {
     // Short forms have no places of their own to point at.
@@ -94,13 +90,14 @@ FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run&
       run_(run),
       box_(run.box(boundingBox(shape))),
       longestSide_(run.longestSide(boundingBox(shape))),
-      names_({.along = [this](const Vec3f& direction) { return along(direction); },
-              .facing = [this](const Vec3f& direction) { return facing(direction); },
-              .mask = [this](const std::string& path, const std::string& grid) { return mask(path, grid); },
-              .attribute = [this](const std::string& name,
-                                  bool hasSpheres) { return attribute(name, hasSpheres); },
-              .time = frameOf(run),
-              .seed = options.seed}) {}
+      names_(namesOfShape(
+          {.along = [this](const Vec3f& direction) { return along(direction); },
+           .facing = [this](const Vec3f& direction) { return facing(direction); },
+           .mask = [this](const std::string& path, const std::string& grid) { return mask(path, grid); },
+           .attribute = [this](const std::string& name,
+                               bool hasSpheres) { return attribute(name, hasSpheres); },
+           .time = frameOf(run),
+           .seed = options.seed})) {}
 
 ScalarField FieldSources::field(const FieldValue& value) {
   if (value.constant) return float(value.constant->inWorldUnits(value.quantity.unit, longestSide_));
@@ -110,7 +107,8 @@ ScalarField FieldSources::field(const FieldValue& value) {
   const Interval range = result.range(box_.expanded(float(options_.reach)));
   requireAllowed(value, range);
   // Far away, where nobody asks, it may be anything; what grows layers wants bounds for all of space.
-  return std::isfinite(result.range(Box::everywhere()).magnitude()) ? result : clamp(result, range.min, range.max);
+  return std::isfinite(result.range(Box::everywhere()).magnitude()) ? result
+                                                                    : clamp(result, range.min, range.max);
 }
 
 double FieldSources::bound(const FieldValue& value, const Mesh& mesh, int seed, const Run& run) {
@@ -122,13 +120,13 @@ double FieldSources::bound(const FieldValue& value, const Mesh& mesh, int seed, 
                            return Interval{lowest, 1};
                          }});
   };
-  const ShapeNames names(
-      {.along = [&](const Vec3f&) { return share(0); },
-       .facing = [&](const Vec3f&) { return share(-1); },
-       .mask = [&](const std::string&, const std::string&) { return share(0); },
-       .attribute = [&](const std::string& name, bool) { return attributeRange(mesh, name); },
-       .time = frameOf(run),
-       .seed = seed});
+  const ExpressionNames names =
+      namesOfShape({.along = [&](const Vec3f&) { return share(0); },
+                    .facing = [&](const Vec3f&) { return share(-1); },
+                    .mask = [&](const std::string&, const std::string&) { return share(0); },
+                    .attribute = [&](const std::string& name, bool) { return attributeRange(mesh, name); },
+                    .time = frameOf(run),
+                    .seed = seed});
   const Interval range = madeOf(value, names, longestSide).range(box.expanded(float(longestSide) / 2));
   requireAllowed(value, range);
   return double(range.max);

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "apps/app.h"
+#include "apps/options/expression_names.h"
 #include "apps/options/field_value.h"
-#include "apps/options/shape_names.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/field/field.h"
 
@@ -63,7 +63,7 @@ class FieldSources {
   std::map<std::string, ScalarField> made_;
   /// The option whose value is being made, for messages.
   std::string option_;
-  ShapeNames names_;
+  ExpressionNames names_;
 };
 
 }  // namespace nephele::apps

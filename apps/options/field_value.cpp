@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/options/shape_names.h"
+#include "apps/options/expression_names.h"
 #include "nephele/levelset/io/vdb_io.h"
 
 namespace nephele::apps {
@@ -241,10 +241,9 @@ FieldValue parsedExpression(const std::string& option, const std::string& text, 
   FieldValue value{.quantity = quantity, .option = option, .text = text};
   value.expression = text.substr(1);
   value.isTypedAsExpression = true;
-  static const ShapeNames names;
-  const felt::ExpressionText checked(option, value.expression, {felt::Kind::scalarField}, names.registry(),
-                                     names.given());
-  for (const std::string& string : checked.strings())
+  static const ExpressionNames names = namesOfShape();
+  for (const std::string& string :
+       checkedExpression(option, value.expression, {felt::Kind::scalarField}, names))
     if (isVolumeFile(string)) value.files.push_back(string);
   return value;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/options/expression_names.h"
 #include "nephele/levelset/flow/advection_files.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
@@ -102,6 +103,12 @@ void set(VelocityArguments& velocity, const Entry& entry) {
 }  // namespace
 
 void parseVelocity(const std::string& name, const std::string& text, VelocityArguments& velocity) {
+  if (text.starts_with('=')) {
+    velocity.source = VelocityArguments::Source::expression;
+    velocity.expression = text.substr(1);
+    checkedExpression(name, velocity.expression, {felt::Kind::vectorField}, namesOfPlace(0, 0));
+    return;
+  }
   const std::size_t colon = text.find(':');
   const std::string word = text.substr(0, colon);
   if (word == "noise" || word == "curl") {
@@ -132,6 +139,10 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
 VectorField VelocityArguments::field(double longestSide) const {
   if (source == Source::file) return readVelocity(path, grid);
   if (source == Source::constant) return VectorField(constant);
+  if (source == Source::expression)
+    return evaluated("--velocity", expression, {felt::Kind::vectorField},
+                     namesOfPlace(double(time.value_or(0.0f)), seed), longestSide)
+        .as<VectorField>();
   double share = 0;
   for (int i = 0; i < octaves; ++i) share += std::pow(roughness, 2 * i);
   const double rms = amplitude.worldUnits(longestSide) / std::sqrt(share);

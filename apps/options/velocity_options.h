@@ -8,9 +8,10 @@
 
 namespace nephele::apps {
 
-/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", "-20,0,0", or a volume file.
+/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", "-20,0,0", a volume file, or an
+/// expression after "=".
 struct VelocityArguments {
-  enum class Source { noise, curl, constant, file };
+  enum class Source { noise, curl, constant, file, expression };
 
   Source source = Source::noise;
   /// Rms of each component, per unit of time.
@@ -22,6 +23,8 @@ struct VelocityArguments {
   std::optional<float> time;
   /// The same everywhere, world units per unit of time.
   Vec3f constant{};
+  /// In Felt, of P, time and seed.
+  std::string expression;
   /// Of the file: its path and the name of the grid, or "" to look for the usual ones.
   std::string path, grid;
 
@@ -30,7 +33,7 @@ struct VelocityArguments {
 };
 
 /// Reads `text`, the value of the option `name`. @throws CLI::ValidationError naming the option, the key and
-/// what is allowed.
+/// what is allowed; felt::ScriptError with the faults of an expression.
 void parseVelocity(const std::string& name, const std::string& text, VelocityArguments& velocity);
 
 }  // namespace nephele::apps

@@ -23,27 +23,37 @@ struct ShapeLookUps {
   int seed = 0;
 };
 
-/// All that expressions of parameters may use: the language's own functions, and
+/// What an expression may use: functions, and names with their values.
+struct ExpressionNames {
+  std::unique_ptr<felt::Registry> registry;
+  std::vector<felt::Given> given;
+};
+
+/// The language's own functions, and
 ///
 ///     P                       the place
+///     time, seed              the frame, and --seed
+ExpressionNames namesOfPlace(double time, int seed);
+
+/// The same, and
+///
 ///     height                  0 at the lowest point of the shape, 1 at the highest
 ///     normal                  the unit normal of the surface at its nearest point
-///     time, seed              the frame, and --seed
 ///     along(direction)        height along another direction; along(direction, false) goes on beyond
 ///     facing(direction)       cosine between the normal and the direction
 ///     mask(path, grid)        a grid as 0 to 1
 ///     attribute(name, how)    a vertex attribute of the mesh, "closest" or blended by "spheres"
-class ShapeNames {
- public:
-  /// Without look-ups expressions can be checked, not evaluated.
-  explicit ShapeNames(ShapeLookUps lookUps = {});
+///
+/// Without look-ups expressions can be checked, not evaluated.
+ExpressionNames namesOfShape(const ShapeLookUps& lookUps = {});
 
-  const felt::Registry& registry() const { return *registry_; }
-  const std::vector<felt::Given>& given() const { return given_; }
+/// The value of the expression that was given to `option`, converted to `type`; `2.5%` and `6x` refer to
+/// `longestSide`. @throws felt::ScriptError
+felt::Value evaluated(const std::string& option, const std::string& expression, const felt::Type& type,
+                      const ExpressionNames& names, double longestSide);
 
- private:
-  std::unique_ptr<felt::Registry> registry_;
-  std::vector<felt::Given> given_;
-};
+/// Only looks for faults, and returns the strings in it, such as files. @throws felt::ScriptError
+std::vector<std::string> checkedExpression(const std::string& option, const std::string& expression,
+                                           const felt::Type& type, const ExpressionNames& names);
 
 }  // namespace nephele::apps

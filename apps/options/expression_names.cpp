@@ -1,5 +1,6 @@
-#include "apps/options/shape_names.h"
+#include "apps/options/expression_names.h"
 
+#include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 
@@ -22,9 +23,19 @@ bool isSpheres(const std::string& how) {
 
 }  // namespace
 
-ShapeNames::ShapeNames(ShapeLookUps lookUps) : registry_(std::make_unique<felt::Registry>()) {
-  felt::Registry& r = *registry_;
-  felt::addModelingFunctions(r);
+ExpressionNames namesOfPlace(double time, int seed) {
+  ExpressionNames names{std::make_unique<felt::Registry>(),
+                        {{"P", {felt::Kind::vectorField}, identity()},
+                         {"time", {felt::Kind::number}, time},
+                         {"seed", {felt::Kind::integer}, std::int64_t(seed)}}};
+  felt::addModelingFunctions(*names.registry);
+  felt::addLevelsetFunctions(*names.registry);
+  return names;
+}
+
+ExpressionNames namesOfShape(const ShapeLookUps& lookUps) {
+  ExpressionNames names = namesOfPlace(lookUps.time, lookUps.seed);
+  felt::Registry& r = *names.registry;
   r.group("the shape");
   r.add("scalarfield along(vector direction, bool clamped = true)",
         "0 where the shape begins in this direction, 1 where it ends, and so beyond, unless it is not "
@@ -53,16 +64,22 @@ ShapeNames::ShapeNames(ShapeLookUps lookUps) : registry_(std::make_unique<felt::
   const auto normal = [facing = lookUps.facing]() -> felt::Value {
     return normalize(vectorField(facing({1, 0, 0}), facing({0, 1, 0}), facing({0, 0, 1})));
   };
-  given_ = {{"P", {felt::Kind::vectorField}, identity()},
-            {"height",
-             {felt::Kind::scalarField},
-             {},
-             [along = lookUps.along] {
-               return felt::Value(along({0, 1, 0}));
-             }},
-            {"normal", {felt::Kind::vectorField}, {}, normal},
-            {"time", {felt::Kind::number}, lookUps.time},
-            {"seed", {felt::Kind::integer}, std::int64_t(lookUps.seed)}};
+  const auto height = [along = lookUps.along] { return felt::Value(clamp(along({0, 1, 0}), 0, 1)); };
+  names.given.push_back({"height", {felt::Kind::scalarField}, {}, height});
+  names.given.push_back({"normal", {felt::Kind::vectorField}, {}, normal});
+  return names;
+}
+
+felt::Value evaluated(const std::string& option, const std::string& expression, const felt::Type& type,
+                      const ExpressionNames& names, double longestSide) {
+  felt::Context context;
+  context.longestSide = longestSide;
+  return felt::ExpressionText(option, expression, type, *names.registry, names.given).evaluate(context);
+}
+
+std::vector<std::string> checkedExpression(const std::string& option, const std::string& expression,
+                                           const felt::Type& type, const ExpressionNames& names) {
+  return felt::ExpressionText(option, expression, type, *names.registry, names.given).strings();
 }
 
 }  // namespace nephele::apps
