@@ -59,7 +59,8 @@ void addFlowFunctions(Registry& r) {
           requireRoom(region, 4, context);
           const ProjectionBox box = boxOf(region, wallsNamed(walls));
           return continued(withoutDivergence(velocity, box, *context.progress), box);
-        });
+        })
+      .isSampled = true;
 }
 
 }  // namespace nephele::felt

@@ -67,6 +67,7 @@ class Projection {
       edges_[axis] = length(edge);
       for (int row = 0; row < 3; ++row) toWorld_(row, axis) = edge[row] / edges_[axis];
     }
+    isTurned_ = toWorld_ != Mat3f::identity();
     for (int axis = 0; axis < 3; ++axis)
       require(std::abs(dot(column(toWorld_, axis), column(toWorld_, (axis + 1) % 3))) <= kMostObliqueness,
               "projection: the edges of the box must be perpendicular to each other");
@@ -114,18 +115,24 @@ class Projection {
       const int last = std::min(first + rows, n_.y);
       const std::size_t count = std::size_t(last - first) * nx;
       for (int c = 0; c < 3; ++c) points[c].resize(count), found[c].resize(count);
-      for (std::size_t i = 0; i < count; ++i) {
-        const Vec3f p = box_.lattice.indexToWorld(Vec3f(float(i % nx), float(first + int(i / nx)), float(z)));
-        for (int c = 0; c < 3; ++c) points[c][i] = p[c];
-      }
+      std::size_t i = 0;
+      for (int y = first; y < last; ++y)
+        for (int x = 0; x < n_.x; ++x, ++i) {
+          const Vec3f p = box_.lattice.indexToWorld(Vec3f(Vec3i{x, y, z}));
+          for (int c = 0; c < 3; ++c) points[c][i] = p[c];
+        }
       velocity_.eval({points[0], points[1], points[2]}, Spans<3>{{found[0], found[1], found[2]}});
-      for (std::size_t i = 0; i < count; ++i) {
-        const Vec3f u(found[0][i], found[1][i], found[2][i]);
-        if (!isFinite(u))
-          throw Error(fmt::format("projection: the velocity at {:g},{:g},{:g} is not finite", points[0][i],
-                                  points[1][i], points[2][i]));
-        for (int c = 0; c < 3; ++c)
-          values_[c].row(first + int(i / nx), z)[i % nx] = dot(column(toWorld_, c), u);
+      i = 0;
+      for (int y = first; y < last; ++y) {
+        float* to[3];
+        for (int c = 0; c < 3; ++c) to[c] = values_[c].row(y, z);
+        for (int x = 0; x < n_.x; ++x, ++i) {
+          const Vec3f u(found[0][i], found[1][i], found[2][i]);
+          if (!isFinite(u))
+            throw Error(fmt::format("projection: the velocity at {:g},{:g},{:g} is not finite", points[0][i],
+                                    points[1][i], points[2][i]));
+          for (int c = 0; c < 3; ++c) to[c][x] = isTurned_ ? dot(column(toWorld_, c), u) : u[c];
+        }
       }
     }
     // What rows are padded with is transformed, too, and must be numbers.
@@ -265,17 +272,21 @@ class Projection {
           place += kWidth;
           continue;
         }
-        const float* rows[3];
-        for (int c = 0; c < 3; ++c) rows[c] = values_[c].row(y.index, z.index);
-        const float signY = y.isMirrored ? -1.0f : 1.0f, signZ = z.isMirrored ? -1.0f : 1.0f;
-        for (const Source& x : sources[0]) {
-          Vec3f u{};
-          if (x.isThere)
-            u = toWorld_ * Vec3f(x.isMirrored ? -rows[0][x.index] : rows[0][x.index],
-                                 signY * rows[1][x.index], signZ * rows[2][x.index]);
-          for (int c = 0; c < 3; ++c) stored[std::size_t(c)][place] = u[c];
-          ++place;
+        const float signs[3] = {1.0f, y.isMirrored ? -1.0f : 1.0f, z.isMirrored ? -1.0f : 1.0f};
+        float u[3][kWidth];
+        for (int c = 0; c < 3; ++c) {
+          const float* const row = values_[c].row(y.index, z.index);
+          for (int x = 0; x < kWidth; ++x) {
+            const Source& from = sources[0][std::size_t(x)];
+            u[c][x] = from.isThere ? (c == 0 && from.isMirrored ? -1.0f : signs[c]) * row[from.index] : 0.0f;
+          }
         }
+        for (int c = 0; c < 3; ++c)
+          for (int x = 0; x < kWidth; ++x)
+            stored[std::size_t(c)][place + std::size_t(x)] =
+                isTurned_ ? toWorld_(c, 0) * u[0][x] + toWorld_(c, 1) * u[1][x] + toWorld_(c, 2) * u[2][x]
+                          : u[c][x];
+        place += kWidth;
       }
   }
 
@@ -287,6 +298,7 @@ class Projection {
   Vec3f edges_;
   /// From the axes of the box to those of the world: a turn, perhaps with a mirror.
   Mat3f toWorld_;
+  bool isTurned_ = false;
   /// The components along the axes of the box.
   BoxValues values_[3];
   /// One for all components, or one for each.

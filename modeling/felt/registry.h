@@ -37,6 +37,8 @@ struct Function {
   std::vector<Parameter> parameters;
   /// Further arguments of any type may follow.
   bool isOpen = false;
+  /// The result holds samples of its arguments, not the arguments.
+  bool isSampled = false;
   std::function<Value(Call&)> run;
 };
 

@@ -34,11 +34,11 @@ void addOfKind(Registry& r, const std::string& kind, const std::string& field) {
         kind + "cache c(domain((-1,-1,-1), (2,2,2), 0.1)); cachewrite(c, " + field + "); " + kind +
             "field f = cacheread(c);",
         [](const Held& cache) { return samplesOf(*cache); });
-  r.add(
-      kind + "field bake(" + kind + "field f, domain box)",
-      "`f` sampled at the corners of all cells of a domain: `cachewrite` and `cacheread` in one.",
-      kind + "field fast = bake(" + field + ", domain((-1,-1,-1), (2,2,2), 0.1));",
-      [](Context& context, const Field<T>& f, const Domain& domain) { return sampled(f, domain, context); });
+  r.add(kind + "field bake(" + kind + "field f, domain box)",
+        "`f` sampled at the corners of all cells of a domain: `cachewrite` and `cacheread` in one.",
+        kind + "field fast = bake(" + field + ", domain((-1,-1,-1), (2,2,2), 0.1));",
+        [](Context& context, const Field<T>& f, const Domain& domain) { return sampled(f, domain, context); })
+      .isSampled = true;
 }
 
 }  // namespace

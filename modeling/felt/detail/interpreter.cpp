@@ -299,7 +299,7 @@ Value Interpreter::callBuiltIn(const Expression& call) {
     fail(Code::failed, call.span, error.what());
   }
   if (const void* node = nodeOf(result)) {
-    if (!isConstant(result)) result.depth = depth + 1;
+    if (!isConstant(result)) result.depth = call.function->isSampled ? 1 : depth + 1;
     if (result.depth > context_.limits.depth)
       fail(Code::limit, call.span,
            "a field of more than " + std::to_string(context_.limits.depth) + " operations in each other",
@@ -307,7 +307,8 @@ Value Interpreter::callBuiltIn(const Expression& call) {
     if (keepsParts_ && made_.find(node) == made_.end()) {
       Made entry{result, {}};
       for (const Value& argument : arguments)
-        if (const void* part = nodeOf(argument)) entry.parts.push_back(part);
+        if (const void* part = call.function->isSampled ? nullptr : nodeOf(argument))
+          entry.parts.push_back(part);
       made_.emplace(node, std::move(entry));
     }
   }

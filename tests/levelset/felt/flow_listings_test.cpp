@@ -100,6 +100,28 @@ TEST_F(FeltFlows, WithoutGridsEdgesStaySharpAndSidesAlike) {
   EXPECT_LT(smeared.unmirrored, 1e-3);
 }
 
+// Hot and cold from opposite ends, equal and opposite: speeds are mirror images for 50 steps, within 1e-3 of
+// the largest.
+TEST_F(FeltFlows, WithoutGridsHotAndColdStayMirrorImages) {
+  auto values = ran(listing("12_inject") +
+                    "domain region((0,0,0), (10,10,10), 0.5); float dt = 0.25; vector gravity = (0,-1,0);\n"
+                    "vectorfield velocity = (0,0,0); scalarfield hot = 0; scalarfield cold = 0;\n"
+                    "vector hotpoint = (5,2.5,5); vector coldpoint = (5,7.5,5);\n" +
+                    repeated(50, listing("13_hot_and_cold_gridless")));
+  const auto& velocity = values["velocity"].as<VectorField>();
+  float fastest = 0, most = 0;
+  for (int z = 0; z <= 20; ++z)
+    for (int y = 0; y <= 10; ++y)
+      for (int x = 0; x <= 20; ++x) {
+        const Vec3f p = Vec3f{float(x), float(y), float(z)} * 0.5f;
+        const float here = length(velocity(p)), there = length(velocity({p.x, 10 - p.y, p.z}));
+        fastest = std::max(fastest, here);
+        most = std::max(most, std::abs(here - there));
+      }
+  EXPECT_GT(fastest, 0.5f);
+  EXPECT_LT(most, 1e-3f * fastest);
+}
+
 TEST_F(FeltFlows, ObstaclesTurnBackWhatFlowsOutAsPrintedAndInWithTheSignMended) {
   const std::string given =
       "vectorfield velocity = curlnoise(\"perlin\", 1, 4); scalarfield object = sphere((0.013,0,0), 1);\n";
