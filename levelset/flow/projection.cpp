@@ -116,11 +116,13 @@ class Projection {
       const std::size_t count = std::size_t(last - first) * nx;
       for (int c = 0; c < 3; ++c) points[c].resize(count), found[c].resize(count);
       std::size_t i = 0;
-      for (int y = first; y < last; ++y)
-        for (int x = 0; x < n_.x; ++x, ++i) {
-          const Vec3f p = box_.lattice.indexToWorld(Vec3f(Vec3i{x, y, z}));
-          for (int c = 0; c < 3; ++c) points[c][i] = p[c];
-        }
+      const Affine& map = box_.lattice.indexToWorld;
+      const Vec3f step = column(map.linear, 0);
+      for (int y = first; y < last; ++y) {
+        const Vec3f start = map(Vec3f(Vec3i{0, y, z}));
+        for (int x = 0; x < n_.x; ++x, ++i)
+          for (int c = 0; c < 3; ++c) points[c][i] = start[c] + float(x) * step[c];
+      }
       velocity_.eval({points[0], points[1], points[2]}, Spans<3>{{found[0], found[1], found[2]}});
       i = 0;
       for (int y = first; y < last; ++y) {
@@ -264,6 +266,9 @@ class Projection {
       for (int i = 0; i < kWidth; ++i)
         sources[std::size_t(axis)][std::size_t(i)] =
             sourceOf(axis, brick[axis] * kBrickSide + i - BrickGrid::kBefore - 1);
+    // Most of a row lies side by side in the box, too.
+    const int before = brick.x * kBrickSide - BrickGrid::kBefore - 1;
+    const int first = std::clamp(-before, 0, kWidth), last = std::clamp(n_.x - before, first, kWidth);
     std::size_t place = 0;
     for (const Source& z : sources[2])
       for (const Source& y : sources[1]) {
@@ -273,19 +278,24 @@ class Projection {
           continue;
         }
         const float signs[3] = {1.0f, y.isMirrored ? -1.0f : 1.0f, z.isMirrored ? -1.0f : 1.0f};
-        float u[3][kWidth];
+        float turned[3][kWidth];
         for (int c = 0; c < 3; ++c) {
           const float* const row = values_[c].row(y.index, z.index);
-          for (int x = 0; x < kWidth; ++x) {
+          float* const to = isTurned_ ? turned[c] : stored[std::size_t(c)] + place;
+          const auto copyOne = [&](int x) {
             const Source& from = sources[0][std::size_t(x)];
-            u[c][x] = from.isThere ? (c == 0 && from.isMirrored ? -1.0f : signs[c]) * row[from.index] : 0.0f;
-          }
+            to[x] = from.isThere ? (c == 0 && from.isMirrored ? -1.0f : signs[c]) * row[from.index] : 0.0f;
+          };
+          for (int x = 0; x < first; ++x) copyOne(x);
+          for (int x = first; x < last; ++x) to[x] = signs[c] * row[before + x];
+          for (int x = last; x < kWidth; ++x) copyOne(x);
         }
-        for (int c = 0; c < 3; ++c)
-          for (int x = 0; x < kWidth; ++x)
-            stored[std::size_t(c)][place + std::size_t(x)] =
-                isTurned_ ? toWorld_(c, 0) * u[0][x] + toWorld_(c, 1) * u[1][x] + toWorld_(c, 2) * u[2][x]
-                          : u[c][x];
+        if (isTurned_)
+          for (int c = 0; c < 3; ++c)
+            for (int x = 0; x < kWidth; ++x)
+              stored[std::size_t(c)][place + std::size_t(x)] = toWorld_(c, 0) * turned[0][x] +
+                                                               toWorld_(c, 1) * turned[1][x] +
+                                                               toWorld_(c, 2) * turned[2][x];
         place += kWidth;
       }
   }
