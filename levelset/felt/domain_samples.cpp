@@ -229,7 +229,7 @@ Affine sampleToWorld(const Domain& domain) {
 
 double sampledBytes(const Domain& domain, int components) {
   // While grids are made, parts of them are there twice.
-  constexpr double kMaking = 1.2;
+  constexpr double kMaking = 1.5;
   const Vec3i cells = cellsOf(domain);
   double bricks = 1;
   for (int axis = 0; axis < 3; ++axis) bricks *= brickOf(cells[axis] + 2) + 1;

@@ -27,10 +27,12 @@ S grown(const Context& context, const Shape& shape, float voxelSize, const Cumul
                                .exteriorBand = cumuloExteriorBand(layers, voxelSize),
                                .interiorBand = cumuloInteriorBand(layers, voxelSize)},
                               *context.progress);
-  return griddedCumulo(base, layers,
-                       {.voxelSize = voxelSize, .box = box, .closestPoint = closestPoint(solid)},
-                       *context.progress)
-      .surface;
+  const GriddedCumulo cumulo =
+      griddedCumulo(base, layers, {.voxelSize = voxelSize, .box = box, .closestPoint = closestPoint(solid)},
+                    *context.progress);
+  // Sums of layers are up to twice as steep as distances.
+  constexpr float kSlope = 4;
+  return endingAt(cumulo.surface, cumulo.box.expanded(voxelSize), kSlope);
 }
 
 }  // namespace

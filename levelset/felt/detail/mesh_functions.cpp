@@ -13,7 +13,10 @@
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
+#include "nephele/modeling/shape/combinations.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::felt {
 
@@ -58,14 +61,46 @@ bool isCutShort(const BrickGrid& grid, float band) {
   return found;
 }
 
+/// The share of a box in which ranges leave open whether `level` is within the band.
+double unsettledShare(const S& level, const Box& box, const Interval& band, int splits) {
+  const Interval range = level.range(box);
+  if (range.min > band.max || range.max < band.min) return 0;
+  if (splits == 0) return 1;
+  const S local = level.restrictedTo(box);
+  const Vec3f middle = box.center();
+  double share = 0;
+  for (int part = 0; part < 8; ++part) {
+    Box octant = box;
+    for (int axis = 0; axis < 3; ++axis) (part >> axis & 1 ? octant.min : octant.max)[axis] = middle[axis];
+    share += unsettledShare(local, octant, band, splits - 1) / 8;
+  }
+  return share;
+}
+
+/// @throws CallError if the samples that the band may need take more memory than is allowed.
+void requireRoomForSurface(const S& level, const BakeOptions& options, const Context& context) {
+  // Parts of the box are told apart down to some 16 voxels.
+  constexpr double kMaking = 1.5, kVoxels = 16;
+  constexpr int kMostSplits = 7;
+  const Vec3f size = options.box.size() * (1 / options.voxelSize);
+  const double dense = double(size.x + 8) * (size.y + 8) * (size.z + 8) / kBrickSamples * BrickGrid::kVolume *
+                       sizeof(float) * kMaking;
+  const double longest = double(options.box.longestSide() / options.voxelSize);
+  const int splits = std::clamp(int(std::log2(longest / kVoxels)), 0, kMostSplits);
+  requireBytes(dense * unsettledShare(level, options.box, options.band, splits),
+               fmt::format("a surface in {:.0f} x {:.0f} x {:.0f} cells", size.x + 1, size.y + 1, size.z + 1),
+               "ask for fewer cells", context);
+}
+
 /// The samples of a level set that its surface needs. Values beyond a band are constants: one of two voxels
 /// suits distances, and where a field is steeper it grows until it holds all that stands beside the surface.
 std::shared_ptr<BrickGrid> samplesOfSurface(const S& level, BakeOptions options, float voxel,
-                                            const Progress& progress) {
+                                            const Context& context) {
   constexpr float kVoxels = 2, kGrowth = 8;
   for (float band = kVoxels * voxel;; band *= kGrowth) {
     options.band = {-band, band};
-    auto grid = bakeGrid(level, options, progress);
+    requireRoomForSurface(level, options, context);
+    auto grid = bakeGrid(level, options, *context.progress);
     if (!std::isfinite(band) || !isCutShort(*grid, band)) return grid;
   }
 }
@@ -80,7 +115,7 @@ ShapePtr surfaceWithin(const Context& context, const S& level, const Domain& dom
                                      {.voxelSize = 1,
                                       .box = {{0.5f, 0.5f, 0.5f}, last - Vec3f(0.5f, 0.5f, 0.5f)},
                                       .background = kFarOutside},
-                                     lattice.voxelSize, *context.progress);
+                                     lattice.voxelSize, context);
   grid->setLattice(lattice);
   return shapeOf(marchingCubes(*grid, 0, *context.progress), "surface");
 }
@@ -90,7 +125,7 @@ ShapePtr surface(const Context& context, const S& level, std::int64_t resolution
   const Box box = extentOf(level, *context.progress);
   const float voxel = box.longestSide() / float(voxels);
   const auto grid =
-      samplesOfSurface(level, {.voxelSize = voxel, .box = box.expanded(2 * voxel)}, voxel, *context.progress);
+      samplesOfSurface(level, {.voxelSize = voxel, .box = box.expanded(2 * voxel)}, voxel, context);
   return shapeOf(marchingCubes(*grid, 0, *context.progress), "surface");
 }
 
@@ -101,10 +136,11 @@ S distanceTo(const Context& context, const Shape& shape, double voxelSize, const
         Code::outOfRange,
         fmt::format("voxel is {:g}, and must be below a quarter of the shape's longest side, {:g}", voxelSize,
                     reach / 2));
-  return namingFile(shape.name, [&] {
+  const S level = namingFile(shape.name, [&] {
     return meshDistance(solid, {.voxelSize = voxelSize, .exteriorBand = reach, .interiorBand = reach},
                         *context.progress);
   });
+  return endingAt(level, boundingBox(solid).expanded(static_cast<float>(voxelSize)), 1);
 }
 
 std::vector<Value> cut(const Context& context, const Shape& shape, const Array& knives,
@@ -153,17 +189,15 @@ void addSurfaces(Registry& r) {
       "its faces.",
       "shape dome = ls2shape(sphere((0,0,0), 1), domain((-1.2,0,-1.2), (2.4,1.2,2.4), 0.1));",
       [](Context& context, const S& f, const Domain& box) { return surfaceWithin(context, f, box); });
-  r.add(
-      "scalarfield shape2ls(shape s, int resolution = 128)",
-      "Distance to a shape, positive inside, with so many voxels along its longest side; constant from half "
-      "of "
-      "that side on. Shapes that are not closed are repaired.",
-      "scalarfield level = shape2ls(ls2shape(sphere((0,0,0), 1), 32), 32);",
-      [](Context& context, const ShapePtr& s, std::int64_t resolution) {
-        const int voxels = countWithin("resolution", resolution, kFewestVoxels + 1, kMostVoxels);
-        const Mesh solid = solidOf(*s, context);
-        return distanceTo(context, *s, double(boundingBox(solid).longestSide()) / voxels, solid);
-      });
+  r.add("scalarfield shape2ls(shape s, int resolution = 128)",
+        "Distance to a shape, positive inside, with so many voxels along its longest side; far from "
+        "it the distance to its box. Shapes that are not closed are repaired.",
+        "scalarfield level = shape2ls(ls2shape(sphere((0,0,0), 1), 32), 32);",
+        [](Context& context, const ShapePtr& s, std::int64_t resolution) {
+          const int voxels = countWithin("resolution", resolution, kFewestVoxels + 1, kMostVoxels);
+          const Mesh solid = solidOf(*s, context);
+          return distanceTo(context, *s, double(boundingBox(solid).longestSide()) / voxels, solid);
+        });
   r.add("scalarfield shape2ls(shape s, float voxel)",
         "Distance to a shape, positive inside, with voxels of that size near its surface.",
         "scalarfield level = shape2ls(ls2shape(sphere((0,0,0), 1), 32), voxel = 0.1);",
@@ -173,6 +207,10 @@ void addSurfaces(Registry& r) {
 }
 
 }  // namespace
+
+S endingAt(const S& level, const Box& box, float slope) {
+  return intersection(level, slope * nephele::box(box));
+}
 
 Mesh solidOf(const Shape& shape, const Context& context) {
   RepairedMesh repaired =

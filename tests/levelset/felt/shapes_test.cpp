@@ -41,6 +41,33 @@ TEST(FeltShapes, BecomeDistancesThatGoFar) {
   for (const float r : {0.3f, 0.8f, 1.0f, 1.2f, 1.8f}) EXPECT_NEAR(level({0, r, 0}), 1 - r, 4e-3f) << r;
 }
 
+TEST(FeltShapes, OfMeshesAndCloudsHaveAnEndThatRangesShow) {
+  auto values =
+      ran("shape ball = ls2shape(sphere((0,0,0), 1), 64);\nshape again = ls2shape(shape2ls(ball, 64), 64);\n"
+          "shape cloud = ls2shape(cumulo(ball, 0.05, 2, amplitude = 0.05, frequency = 2), 64);");
+  EXPECT_NEAR(diagnose(meshOf(values["again"])).volume / kBall, 1, 3e-3);
+  const MeshDiagnosis cloud = diagnose(meshOf(values["cloud"]));
+  EXPECT_TRUE(cloud.manifold());
+  EXPECT_GT(cloud.volume, 1.05 * kBall);
+}
+
+TEST(FeltShapes, TakeNoNoticeOfHowSteepFieldsAre) {
+  // Volume of a ball, whatever its field is multiplied by.
+  for (const std::string steepness : {"1e-6", "1", "1000"}) {
+    auto values = ran("shape ball = ls2shape(" + steepness + " * sphere((0,0,0), 1), 64);");
+    EXPECT_NEAR(diagnose(meshOf(values["ball"])).volume / kBall, 1, 2e-3) << steepness;
+  }
+}
+
+TEST(FeltShapes, AreWarpedOntoEachOtherByNacelleOnADomain) {
+  // Spheres as r^2: the point with the same value lies on the same ray.
+  auto values = ran(
+      "scalarfield one = 1 - identity() * identity(); scalarfield other = 1.69 - identity() * identity();\n"
+      "vectorfield X = nacelle(other, one, domain((-1.5,-1.5,-1.5), (3,3,3), 0.04));");
+  const Vec3f image = values["X"].as<VectorField>()(Vec3f{0.6f, 0, 0.8f} * 1.3f);
+  EXPECT_NEAR(length(image - Vec3f(0.6f, 0, 0.8f)), 0, 1e-3f);
+}
+
 TEST(FeltShapes, AreCutIntoPiecesThatFit) {
   auto values =
       ran("shape[] p = cut(ls2shape(sphere((0,0,0), 1)), [plane((0,0,0), (1,0,0)), plane((0,0,0), (0,1,0))], "
