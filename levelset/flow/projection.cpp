@@ -29,6 +29,7 @@ namespace {
 using detail::AlignedFloats;
 using detail::BoxTransform;
 using detail::BoxValues;
+using detail::Direction;
 using detail::kBlock;
 using detail::Waves;
 
@@ -99,7 +100,7 @@ class Projection {
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t z = begin; z < end; ++z) {
             sample(int(z));
-            for (int c = 0; c < 3; ++c) transform(c).forwardInPlane(values_[c], int(z));
+            for (int c = 0; c < 3; ++c) transform(c).inPlane(Direction::forward, values_[c], int(z));
           }
         },
         progress);
@@ -161,15 +162,16 @@ class Projection {
         [&](std::size_t begin, std::size_t end) {
           AlignedFloats blocks[3];
           for (AlignedFloats& block : blocks) block = detail::alignedFloats(std::size_t(n_.z) * kBlock);
+          const AlignedFloats room = detail::alignedFloats(transform(0).alongZ().roomSize());
           for (std::size_t y = begin; y < end; ++y)
             for (std::size_t x = 0; x < values_[0].rowLength(); x += kBlock) {
               for (int c = 0; c < 3; ++c) {
                 detail::gather(values_[c].row(int(y), 0) + x, plane, n_.z, blocks[c].get());
-                transform(c).forwardAlongZ().run(blocks[c].get());
+                transform(c).alongZ().run(Direction::forward, blocks[c].get(), room.get());
               }
               takeOff(&alongX[x], waveNumber(1, int(y)), alongZ, scale, blocks);
               for (int c = 0; c < 3; ++c) {
-                transform(c).inverseAlongZ().run(blocks[c].get());
+                transform(c).alongZ().run(Direction::inverse, blocks[c].get(), room.get());
                 detail::scatter(blocks[c].get(), n_.z, values_[c].row(int(y), 0) + x, plane);
               }
             }
@@ -205,7 +207,7 @@ class Projection {
         std::size_t(n_.z), 1,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t z = begin; z < end; ++z)
-            for (int c = 0; c < 3; ++c) transform(c).inverseInPlane(values_[c], int(z));
+            for (int c = 0; c < 3; ++c) transform(c).inPlane(Direction::inverse, values_[c], int(z));
         },
         progress);
   }

@@ -44,33 +44,64 @@ void scatter(const float* block, int count, float* to, std::size_t stride) {
     std::memcpy(to + std::size_t(i) * stride, block + std::size_t(i) * kBlock, kBlock * sizeof(float));
 }
 
+WaveTransform::WaveTransform(int cells, Waves waves, Layout layout)
+    : cells_(std::size_t(cells)),
+      waves_(waves),
+      layout_(layout),
+      forward_(waves == Waves::exponentials ? cells : 2 * cells, Direction::forward, layout),
+      inverse_(waves == Waves::exponentials ? cells : 1, Direction::inverse, layout) {}
+
+std::size_t WaveTransform::roomSize() const {
+  if (waves_ == Waves::exponentials) return 0;
+  return layout_ == Layout::row ? 2 * cells_ + 2 : 2 * cells_ * kBlock;
+}
+
+void WaveTransform::run(Direction direction, float* values, float* room) const {
+  if (waves_ == Waves::exponentials)
+    return (direction == Direction::forward ? forward_ : inverse_).run(values);
+  const bool isSine = waves_ == Waves::sines;
+  const std::size_t stride = layout_ == Layout::row ? 1 : kBlock, last = cells_ * stride;
+  if (isSine) {
+    std::fill_n(values, stride, 0.0f);
+    std::fill_n(values + last, stride, 0.0f);
+  }
+  std::copy_n(values, last + stride, room);
+  for (std::size_t i = 1; i < cells_; ++i)
+    for (std::size_t column = 0; column < stride; ++column) {
+      const float value = values[i * stride + column];
+      room[(2 * cells_ - i) * stride + column] = isSine ? -value : value;
+    }
+  forward_.run(room);
+  // Of numbers that are their own mirror image the transform is real, and i times that of the others is. A
+  // block's complex numbers are two columns each, which keeps them apart.
+  if (layout_ == Layout::row)
+    for (std::size_t k = 0; k <= cells_; ++k) values[k] = isSine ? -room[2 * k + 1] : room[2 * k];
+  else if (isSine)
+    for (std::size_t k = 0; k < last + stride; k += 2) values[k] = -room[k + 1], values[k + 1] = room[k];
+  else
+    std::copy_n(room, last + stride, values);
+}
+
 BoxTransform::BoxTransform(const Vec3i& cells, const std::array<Waves, 3>& waves)
-    : lines_{LineTransform(cells.x, waves[0], Direction::forward, LineTransform::Layout::row),
-             LineTransform(cells.y, waves[1], Direction::forward, LineTransform::Layout::block),
-             LineTransform(cells.z, waves[2], Direction::forward, LineTransform::Layout::block),
-             LineTransform(cells.x, waves[0], Direction::inverse, LineTransform::Layout::row),
-             LineTransform(cells.y, waves[1], Direction::inverse, LineTransform::Layout::block),
-             LineTransform(cells.z, waves[2], Direction::inverse, LineTransform::Layout::block)} {}
+    : x_(cells.x, waves[0], Layout::row),
+      y_(cells.y, waves[1], Layout::block),
+      z_(cells.z, waves[2], Layout::block) {}
 
-void BoxTransform::forwardInPlane(const BoxValues& values, int z) const {
-  for (int y = 0; y < values.count().y; ++y) lines_[0].run(values.row(y, z));
-  alongY(lines_[1], values, z);
-}
-
-void BoxTransform::inverseInPlane(const BoxValues& values, int z) const {
-  alongY(lines_[4], values, z);
-  for (int y = 0; y < values.count().y; ++y) lines_[3].run(values.row(y, z));
-}
-
-void BoxTransform::alongY(const LineTransform& line, const BoxValues& values, int z) const {
+void BoxTransform::inPlane(Direction direction, const BoxValues& values, int z) const {
   const int count = values.count().y;
-  const AlignedFloats block = alignedFloats(std::size_t(count) * kBlock);
+  const AlignedFloats block = alignedFloats(std::size_t(count) * kBlock),
+                      room = alignedFloats(std::max(x_.roomSize(), y_.roomSize()));
+  const auto alongX = [&] {
+    for (int y = 0; y < count; ++y) x_.run(direction, values.row(y, z), room.get());
+  };
+  if (direction == Direction::forward) alongX();
   for (std::size_t x = 0; x < values.rowLength(); x += kBlock) {
     float* const columns = values.row(0, z) + x;
     gather(columns, values.rowLength(), count, block.get());
-    line.run(block.get());
+    y_.run(direction, block.get(), room.get());
     scatter(block.get(), count, columns, values.rowLength());
   }
+  if (direction == Direction::inverse) alongX();
 }
 
 }  // namespace nephele::detail

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 
+#include "nephele/levelset/flow/detail/fourier_line.h"
 #include "nephele/modeling/base/math.h"
 
 /// Sums of waves along the axes of a box, in place. For the projection of flows.
@@ -22,41 +23,23 @@ enum class Waves {
   sines,
 };
 
-enum class Direction { forward, inverse };
-
-/// Columns that are transformed together, side by side: numbers of one block lie kBlock apart.
-inline constexpr std::size_t kBlock = 16;
-
-/// Transforms one row or one block of columns.
-class LineTransform {
+/// Along one axis.
+class WaveTransform {
  public:
-  enum class Layout {
-    /// Reals; they become n / 2 + 1 complex numbers where waves are exponentials.
-    row,
-    /// For each number kBlock reals, or kBlock / 2 complex numbers where waves are exponentials.
-    block,
-  };
+  WaveTransform(int cells, Waves waves, Layout layout);
 
-  LineTransform(int cells, Waves waves, Direction direction, Layout layout);
-  ~LineTransform();
-  LineTransform(LineTransform&&) noexcept;
-
-  /// `values` lies at a multiple of kAlignment bytes. May be called from several threads at once.
-  void run(float* values) const;
+  /// Of one row or block, at a multiple of kAlignment bytes. `room` is for roomSize() numbers, aligned
+  /// likewise. May be called from several threads at once.
+  void run(Direction direction, float* values, float* room) const;
+  std::size_t roomSize() const;
 
  private:
-  struct Plan;
-  std::unique_ptr<Plan> plan_;
+  std::size_t cells_;
+  Waves waves_;
+  Layout layout_;
+  /// Sums of cosines and of sines are their own inverse, and need the first alone.
+  FourierLine forward_, inverse_;
 };
-
-inline constexpr std::size_t kAlignment = 64;
-
-/// Numbers at a multiple of kAlignment bytes, not set.
-struct AlignedFree {
-  void operator()(float* values) const;
-};
-using AlignedFloats = std::unique_ptr<float[], AlignedFree>;
-AlignedFloats alignedFloats(std::size_t count);
 
 /// A box of numbers, rows along x padded so that each begins at a multiple of kAlignment bytes.
 class BoxValues {
@@ -85,17 +68,12 @@ class BoxTransform {
 
   /// Along x and then y, or the other way round, of one plane of `values`. From several threads at once for
   /// different planes.
-  void forwardInPlane(const BoxValues& values, int z) const;
-  void inverseInPlane(const BoxValues& values, int z) const;
-  /// Along z, of a block of columns.
-  const LineTransform& forwardAlongZ() const { return lines_[2]; }
-  const LineTransform& inverseAlongZ() const { return lines_[5]; }
+  void inPlane(Direction direction, const BoxValues& values, int z) const;
+  /// Along z, of blocks of columns.
+  const WaveTransform& alongZ() const { return z_; }
 
  private:
-  void alongY(const LineTransform& line, const BoxValues& values, int z) const;
-
-  /// Forward along x, y, z, then inverse.
-  std::array<LineTransform, 6> lines_;
+  WaveTransform x_, y_, z_;
 };
 
 /// Copies a block of `count` numbers per column from or to places `stride` apart.
