@@ -1,6 +1,6 @@
-// A domain is baked in its own coordinates, where its samples are whole numbers: voxel (1, 1, 1) is its first
-// one and voxel 0 the layer before it. What is inside is interpolated there; what is outside is first moved
-// to the nearest point of the box.
+// A domain is baked in its own coordinates, where its samples are whole numbers: voxel (2, 2, 2) is its first
+// one, and two layers before and behind are there for differences. What is inside is interpolated there; what
+// is outside is first moved to the nearest point of the box.
 #include "nephele/levelset/felt/domain_samples.h"
 
 #include <fmt/format.h>
@@ -25,10 +25,13 @@ Vec3i cellsOf(const Domain& domain) {
   return {int(cells.x), int(cells.y), int(cells.z)};
 }
 
-/// From voxels, which begin a cell before the samples, to the world.
+/// Layers of samples beyond those of a domain.
+constexpr int kLayers = 2;
+
+/// From voxels, which begin these layers before the samples, to the world.
 Affine voxelToWorld(const Domain& domain) {
   Affine map = sampleToWorld(domain);
-  map.translation = map(Vec3f{-1, -1, -1});
+  map.translation = map(Vec3f{-kLayers, -kLayers, -kLayers});
   return map;
 }
 
@@ -36,11 +39,13 @@ template <class T>
 class DomainNode final : public FieldNode<T> {
  public:
   static constexpr int kLanes = kComponents<T>;
+  /// The first sample along an edge, voxels.
+  static constexpr float kFirst = kLayers;
 
   DomainNode(const Domain& domain, const std::array<Grid, kLanes>& grids)
       : toVoxel_(inverse(voxelToWorld(domain))),
         last_(toFloat({double(cellsOf(domain).x), double(cellsOf(domain).y), double(cellsOf(domain).z)}) +
-              Vec3f{1, 1, 1}),
+              Vec3f{kLayers, kLayers, kLayers}),
         step_(float(std::min({domain.cell.x, domain.cell.y, domain.cell.z}))) {
     for (int c = 0; c < kLanes; ++c) lanes_[c] = gridField(grids[c]).node();
   }
@@ -62,6 +67,7 @@ class DomainNode final : public FieldNode<T> {
     for (int c = 0; c < kLanes; ++c) {
       const BlockLanes<3> g{grads[3 * c], grads[3 * c + 1], grads[3 * c + 2]};
       lanes_[c]->evalGrad(inside, {values[c]}, g, scratch);
+      sharpen(c, q, points.count, g, scratch);
       const Mat3f& m = toVoxel_.linear;
       for (int i = 0; i < points.paddedCount(); ++i) {
         const float x = g[0][i] * stays[0][i], y = g[1][i] * stays[1][i], z = g[2][i] * stays[2][i];
@@ -84,6 +90,23 @@ class DomainNode final : public FieldNode<T> {
   float differenceStep() const override { return step_; }
 
  private:
+  /// Makes differences over two cells of lane `c` at `q` differences of fourth order, by those over four.
+  void sharpen(int c, const BlockLanes<3>& q, int count, const BlockLanes<3>& g, Scratch& scratch) const {
+    Scratch::Frame frame(scratch);
+    float *const above = frame.lane(), *const below = frame.lane(), *const high = frame.lane(),
+                 *const low = frame.lane();
+    const int padded = (count + 15) & ~15;
+    for (int a = 0; a < 3; ++a) {
+      for (int i = 0; i < padded; ++i) high[i] = q[a][i] + 2.0f, low[i] = q[a][i] - 2.0f;
+      BlockLanes<3> at = q;
+      at[a] = high;
+      lanes_[c]->eval(scratch.pointBlock(at, count), {above}, scratch);
+      at[a] = low;
+      lanes_[c]->eval(scratch.pointBlock(at, count), {below}, scratch);
+      for (int i = 0; i < padded; ++i) g[a][i] = (4.0f * g[a][i] - 0.25f * (above[i] - below[i])) / 3.0f;
+    }
+  }
+
   /// The nearest points of the box, voxels; `stays` is 1 along edges of the box that were not left, else 0.
   template <bool kMarks>
   void moveInside(const PointBlock& points, const BlockLanes<3>& q, const BlockLanes<3>& stays) const {
@@ -92,7 +115,7 @@ class DomainNode final : public FieldNode<T> {
       const float t = toVoxel_.translation[a], last = last_[a];
       for (int i = 0; i < points.paddedCount(); ++i) {
         const float at = m(a, 0) * points.x[i] + m(a, 1) * points.y[i] + m(a, 2) * points.z[i] + t;
-        const float notBelow = at < 1.0f ? 1.0f : at;
+        const float notBelow = at < kFirst ? kFirst : at;
         q[a][i] = notBelow > last ? last : notBelow;
         if constexpr (kMarks) stays[a][i] = q[a][i] == at ? 1.0f : 0.0f;
       }
@@ -115,8 +138,8 @@ class DomainNode final : public FieldNode<T> {
       }
       const double more = std::isfinite(size) ? kRounding * size : 0;
       // What is no number may be anywhere.
-      result.min[a] = low - more > 1 ? std::min(float(low - more), last_[a]) : 1.0f;
-      result.max[a] = high + more < last_[a] ? std::max(float(high + more), 1.0f) : last_[a];
+      result.min[a] = low - more > kFirst ? std::min(float(low - more), last_[a]) : kFirst;
+      result.max[a] = high + more < last_[a] ? std::max(float(high + more), kFirst) : last_[a];
     }
     return result;
   }
@@ -139,21 +162,20 @@ class Mender {
     auto result = std::make_shared<BrickGrid>(*grid_);
     for (const Vec3i& voxel : places_)
       if (isSample(voxel)) set(*result, voxel, meanAround(voxel));
-    const Vec3i one{1, 1, 1}, last = cells_ + one;
+    const Vec3i first{kLayers, kLayers, kLayers}, last = cells_ + first;
     for (const Vec3i& voxel : places_)
-      if (!isSample(voxel)) set(*result, voxel, result->at(min(max(voxel, one), last)));
+      if (!isSample(voxel)) set(*result, voxel, result->at(min(max(voxel, first), last)));
     fillBorders(*result);
     return result;
   }
 
  private:
-  bool isSample(const Vec3i& v) const {
-    return v.x >= 1 && v.y >= 1 && v.z >= 1 && v.x <= cells_.x + 1 && v.y <= cells_.y + 1 &&
-           v.z <= cells_.z + 1;
-  }
-  bool isStored(const Vec3i& v) const {
-    return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= cells_.x + 2 && v.y <= cells_.y + 2 &&
-           v.z <= cells_.z + 2;
+  bool isSample(const Vec3i& v) const { return isWithin(v, 0); }
+  bool isStored(const Vec3i& v) const { return isWithin(v, kLayers); }
+  bool isWithin(const Vec3i& voxel, int layers) const {
+    for (int a = 0; a < 3; ++a)
+      if (voxel[a] < kLayers - layers || voxel[a] > cells_[a] + kLayers + layers) return false;
+    return true;
   }
   static void set(BrickGrid& grid, const Vec3i& voxel, float value) {
     grid.brick(grid.poolIndex(brickOf(voxel)))[sampleOffset(insideBrick(voxel))] = value;
@@ -232,7 +254,7 @@ double sampledBytes(const Domain& domain, int components) {
   constexpr double kMaking = 1.5;
   const Vec3i cells = cellsOf(domain);
   double bricks = 1;
-  for (int axis = 0; axis < 3; ++axis) bricks *= brickOf(cells[axis] + 2) + 1;
+  for (int axis = 0; axis < 3; ++axis) bricks *= brickOf(cells[axis] + 2 * kLayers) + 1;
   return kMaking * bricks * components * BrickGrid::kVolume * sizeof(float);
 }
 
@@ -259,8 +281,9 @@ Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& con
   requireRoom(domain, kComponents<T>, context);
   if (nephele::detail::constantOf(field.node())) return field;
   const Vec3i cells = cellsOf(domain);
-  // From the layer before the first samples to the one behind the last.
-  const Box box{{0.5f, 0.5f, 0.5f}, {float(cells.x) + 1.5f, float(cells.y) + 1.5f, float(cells.z) + 1.5f}};
+  const float behind = 2 * kLayers - 0.5f;
+  const Box box{{0.5f, 0.5f, 0.5f},
+                Vec3f{float(cells.x), float(cells.y), float(cells.z)} + Vec3f{behind, behind, behind}};
   auto grids = baked(transformed(field, inverse(voxelToWorld(domain))), {.voxelSize = 1, .box = box},
                      *context.progress);
   for (auto& grid : grids) grid = Mender(grid, domain).mended();

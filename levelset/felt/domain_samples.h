@@ -14,11 +14,11 @@ Affine sampleToWorld(const Domain& domain);
 /// `field` sampled on `domain` and interpolated: trilinear inside, outside the value of the nearest point of
 /// the box, so that what flows in at a border is what is there.
 ///
-/// Gradients are differences over two cells, also at the border, for which a layer of samples beyond it is
-/// taken; outside they are 0 along the edges of the box that were left. Where one sample alone is not finite,
-/// as the direction of a distance at its centre, it becomes the mean of the six around it. Where the field is
-/// one number over many cells, it costs neither time nor memory. All cores; the same bits at any thread
-/// count.
+/// Gradients are differences of fourth order over two and four cells, also at the border, for which two
+/// layers of samples beyond it are taken; outside they are 0 along the edges of the box that were left. They
+/// cost several times what values do. Where one sample alone is not finite, as the direction of a distance at
+/// its centre, it becomes the mean of the six around it. Where the field is one number over many cells, it
+/// costs neither time nor memory. All cores; the same bits at any thread count.
 /// @throws CallError if the samples may take more memory than `context` allows, or are not finite; Cancelled.
 template <class T>
 Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& context);

@@ -29,8 +29,8 @@ void addOfKind(Registry& r, const std::string& kind, const std::string& field) {
         [](Context& context, const Held& cache, const Field<T>& f) { write(context, *cache, f); });
   r.add(kind + "field cacheread(" + kind + "cache cache)",
         "What was written to the cache last, as a field: linear between samples, and outside the domain the "
-        "value of the nearest point of its border, so that a fluid loses nothing there. Its gradient is that "
-        "of differences over two cells, and does not see the border.",
+        "value of the nearest point of its border, so that a fluid loses nothing there. Its gradient is made "
+        "of differences over two and four cells, and does not see the border.",
         kind + "cache c(domain((-1,-1,-1), (2,2,2), 0.1)); cachewrite(c, " + field + "); " + kind +
             "field f = cacheread(c);",
         [](const Held& cache) { return samplesOf(*cache); });
