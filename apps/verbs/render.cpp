@@ -16,10 +16,10 @@ struct RenderVerbOptions {
 };
 
 void bindOptions(CLI::App& app, RenderVerbOptions& options) {
-  addSceneInputs(
-      app, options.scene,
-      "Densities to look at (.vdb, .nvdb); where they overlap they add up. Or meshes and level sets "
-      "alone, shaded quickly in a light of their own.");
+  addSceneInputs(app, options.scene,
+                 "Densities to look at (.vdb, .nvdb); where they overlap they add up. Or a script (.felt) "
+                 "that declares one, or "
+                 "meshes and level sets alone, shaded quickly in a light of their own.");
   addPictureFiles(app, options.files);
   addPictureOptions(app, options.picture);
   addShadowOutput(app, options.picture.light);
@@ -31,11 +31,11 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   const SceneOptions& scene = options.scene;
   const PictureFiles files{options.files.output, options.files.preview, scene.deep};
   PictureOptions picture = options.picture.withView();
-  if (areShapes(scene.inputs))
+  if (!isScript(scene.inputs) && areShapes(scene.inputs))
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
                               files, run);
-  RenderVolume volume = scene.volume(options.picture, run);
+  RenderVolume volume = scene.volume(picture, run);
   picture = picture.resolved(volume, run);
   scene.addTo(picture, volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();

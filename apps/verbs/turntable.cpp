@@ -63,7 +63,7 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   PictureOptions picture = options.picture.withView();
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
-  const RenderVolume volume = options.scene.volume(options.picture, run);
+  const RenderVolume volume = options.scene.volume(picture, run);
   picture = picture.resolved(volume, run);
   const bool isShown = !options.preview.empty() || !options.movie.empty() || !options.contactSheet.empty();
   options.scene.addTo(picture, volume, isShown, run);

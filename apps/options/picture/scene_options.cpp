@@ -6,22 +6,24 @@
 
 namespace nephele::apps {
 
-RenderVolume SceneOptions::volume(const PictureOptions& picture, Run& run) const {
+RenderVolume SceneOptions::volume(PictureOptions& picture, Run& run) const {
   RenderVolume result =
-      readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
+      isScript(inputs)
+          ? scriptVolume(inputs.front(), script, picture, run)
+          : readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
   if (result.isEmpty()) run.note(inputs.front() + ": the volume is empty, and so is its picture");
   return result;
 }
 
 Extent SceneOptions::extent(const PictureOptions& picture, Run& run) const {
   Extent extent;
-  if (areShapes(inputs)) {
+  if (!isScript(inputs) && areShapes(inputs)) {
     extent = extentOfShapes(inputs, objects, run);
   } else {
-    const RenderVolume read =
-        readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
+    PictureOptions own = picture;
+    const RenderVolume read = volume(own, run);
     extent = extentOf(read);
-    if (!picture.extinction) extent.typicalDensity = read.typicalDensity();
+    if (!own.extinction) extent.typicalDensity = read.typicalDensity();
   }
   CameraOptions camera = picture;
   objects.lift(camera);
@@ -42,6 +44,7 @@ void SceneOptions::addTo(PictureOptions& picture, const RenderVolume& volume, bo
 
 void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs) {
   app.add_option("input", options.inputs, inputs)->required()->type_name("FILE");
+  addScriptOptions(app, options.script);
 }
 
 void addSceneOptions(CLI::App& app, SceneOptions& options, OutputTrial trial) {

@@ -5,6 +5,7 @@
 
 #include "apps/options/picture/object_options.h"
 #include "apps/options/picture/render_options.h"
+#include "apps/options/picture/script_volume.h"
 
 namespace nephele::apps {
 
@@ -15,8 +16,11 @@ struct SceneOptions {
   /// Deep pictures: one to be written, and one of what stands in front. "" where there is none.
   std::string deep, holdout;
 
-  /// Reads the inputs as they are marched, all as one; notes where that is empty. @throws as readVolumes.
-  RenderVolume volume(const PictureOptions& picture, Run& run) const;
+  ScriptOptions script;
+
+  /// Reads the inputs as they are marched, all as one; notes where that is empty. A script may say an
+  /// extinction, which goes into `picture`. @throws as readVolumes and scriptVolume.
+  RenderVolume volume(PictureOptions& picture, Run& run) const;
   /// How large the inputs are, for sequences: volumes, or shapes alone. @throws Error naming the file.
   Extent extent(const PictureOptions& picture, Run& run) const;
   /// Puts the objects into `picture`, which is resolved and shown on screens, too, or not, and that it is to

@@ -24,8 +24,5 @@ Mesh solidOf(const Shape& shape, const Context& context);
 /// `level` cut off by a box that holds all of its inside, so that its ranges show where that ends: beyond the
 /// box it falls by at least `slope` per world unit.
 ScalarField endingAt(const ScalarField& level, const Box& box, float slope);
-/// A box around all that is inside of `level`, found by ranges alone. @throws CallError if there is nothing
-/// inside, or no end of it.
-Box extentOf(const ScalarField& level, const Progress& progress);
 
 }  // namespace nephele::felt

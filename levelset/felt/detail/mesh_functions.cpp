@@ -7,6 +7,7 @@
 #include "nephele/levelset/cut/cut.h"
 #include "nephele/levelset/felt/detail/functions.h"
 #include "nephele/levelset/felt/domain_samples.h"
+#include "nephele/levelset/felt/field_extent.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_distance.h"

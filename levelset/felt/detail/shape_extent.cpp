@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "nephele/levelset/felt/detail/functions.h"
+#include "nephele/levelset/felt/field_extent.h"
 #include "nephele/modeling/field/field.h"
 
 namespace nephele::felt {
@@ -55,7 +56,7 @@ Box extentOf(const ScalarField& level, const Progress& progress) {
     if (!beyond.isEmpty() && 2 * inner >= kFarthest)
       throw CallError(Code::failed,
                       "what is inside has no end, or its ranges show none within 500 000 of the origin",
-                      "ls2shape(f, domain) makes the shape within a box");
+                      "multiply it by a mask, or say within which domain to look");
     box = box.including(beyond);
   }
   for (int pass = 0; pass < kPasses && !box.isEmpty(); ++pass)

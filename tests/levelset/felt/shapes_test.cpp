@@ -106,7 +106,7 @@ TEST(FeltShapes, AreRefusedInWords) {
       refusal("shape s = ls2shape(plane((0,0,0), (0,1,0)));"),
       "s.felt:1:11: error: what is inside has no end, or its ranges show none within 500 000 of the origin\n"
       "  shape s = ls2shape(plane((0,0,0), (0,1,0)));\n            ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\n"
-      "  hint: ls2shape(f, domain) makes the shape within a box");
+      "  hint: multiply it by a mask, or say within which domain to look");
   EXPECT_EQ(refusal("shape s = ls2shape(sphere((0,0,0), 1) - 2);"),
             "s.felt:1:11: error: the field is nowhere above 0, so that there is no shape\n"
             "  shape s = ls2shape(sphere((0,0,0), 1) - 2);\n            ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\n"

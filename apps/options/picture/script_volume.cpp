@@ -1,0 +1,212 @@
+#include "apps/options/picture/script_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "apps/options/expression_names.h"
+#include "nephele/levelset/felt/field_extent.h"
+#include "nephele/levelset/grid/bake.h"
+#include "nephele/modeling/felt/program.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/render/volume/field_volume.h"
+#include "nephele/render/volume/volume_parts.h"
+
+namespace nephele::apps {
+
+namespace {
+
+/// What a script declares of a volume.
+struct ScriptScene {
+  ScalarField density{0.0f};
+  Box box;
+  std::optional<VectorField> color, emission, velocity;
+  std::optional<ScalarField> temperature;
+  std::optional<double> extinction;
+
+  bool hasOthers() const { return color || emission || velocity || temperature; }
+};
+
+/// The share of the memory allowed that the samples of a script may take; the light takes as much again.
+constexpr double kMemoryShare = 0.25;
+constexpr double kMostBytes = 4e9;
+/// Voxels along the box in which a script is looked at to frame it, and at most for what changes slowly.
+constexpr int kCoarse = 96, kSlow = 128;
+
+class Declared {
+ public:
+  Declared(const std::string& path, std::vector<felt::Named> names) : path_(path), names_(std::move(names)) {}
+
+  /// The value called `name` as one of `kind`, or nothing if it is not declared.
+  template <class T>
+  std::optional<T> as(const std::string& name, felt::Kind kind) const {
+    for (const felt::Named& named : names_) {
+      if (named.name != name) continue;
+      const felt::Type type{kind, false};
+      if (!named.value.isSet()) throw Error(path_ + ": '" + name + "' has no value at the end of the script");
+      if (!felt::conversionCost(named.type, type))
+        throw Error(fmt::format("{}: '{}' is {}, and of a volume it is {}", path_, name,
+                                felt::articledName(named.type), felt::articledName(type)));
+      return felt::converted(named.value, type).as<T>();
+    }
+    return std::nullopt;
+  }
+  bool isScalar(const std::string& name) const {
+    return std::any_of(names_.begin(), names_.end(), [&](const felt::Named& named) {
+      return named.name == name && felt::conversionCost(named.type, {felt::Kind::scalarField, false});
+    });
+  }
+
+ private:
+  std::string path_;
+  std::vector<felt::Named> names_;
+};
+
+std::map<std::string, std::string> settingsOf(const ScriptOptions& options) {
+  std::map<std::string, std::string> settings;
+  for (const std::string& text : options.settings) {
+    const std::size_t at = text.find('=');
+    settings[text.substr(0, at)] = text.substr(at + 1);
+  }
+  return settings;
+}
+
+ScriptScene runScript(const std::string& path, const ScriptOptions& options, const PictureOptions& picture,
+                      Run& run) {
+  run.begin("script");
+  const double frame =
+      run.part && run.part->frame ? double(*run.part->frame) : picture.frameNumber.value_or(0);
+  const ExpressionNames names = namesOfPlace(frame, picture.seed);
+  const felt::Program program = felt::Program::fromFile(path, *names.registry, names.given);
+  for (const felt::Diagnostic& warning : program.warnings())
+    run.note(felt::formatted(warning, program.sources()));
+  felt::Context context;
+  context.print = [&run](const std::string& line) { run.note(line); };
+  context.progress = &run;
+  context.limits.memoryBytes = run.memoryLimitBytes;
+  const Declared declared(path, program.run(context, {.settings = settingsOf(options)}));
+
+  ScriptScene scene;
+  const auto density = declared.as<ScalarField>("density", felt::Kind::scalarField);
+  if (!density)
+    throw Error(path +
+                ": declares no 'density'; a script that is looked at says 'scalarfield density = ...;'");
+  scene.density = *density;
+  if (const auto bounds = declared.as<felt::Domain>("bounds", felt::Kind::domain))
+    scene.box = bounds->bounds();
+  else
+    scene.box = namingFile(path, [&] { return felt::extentOf(scene.density, run); });
+  scene.color = declared.as<VectorField>("color", felt::Kind::vectorField);
+  if (declared.isScalar("emission")) {
+    const auto white = *declared.as<ScalarField>("emission", felt::Kind::scalarField);
+    scene.emission = vectorField(white, white, white);
+  } else {
+    scene.emission = declared.as<VectorField>("emission", felt::Kind::vectorField);
+  }
+  scene.temperature = declared.as<ScalarField>("temperature", felt::Kind::scalarField);
+  if (!picture.shutter.isInstant())
+    scene.velocity = declared.as<VectorField>("velocity", felt::Kind::vectorField);
+  scene.extinction = declared.as<double>("extinction", felt::Kind::number);
+  return scene;
+}
+
+VolumePart::Grids threeGrids(const VectorField& field, const BakeOptions& baking, Run& run) {
+  VolumePart::Grids grids;
+  for (std::size_t c = 0; c < 3; ++c) grids[c] = bakeGrid(component(field, int(c)), baking, run);
+  return grids;
+}
+
+VectorField notNegative(const VectorField& field) {
+  return vectorField(max(component(field, 0), 0.0f), max(component(field, 1), 0.0f),
+                     max(component(field, 2), 0.0f));
+}
+
+/// All that the script declares, sampled at one voxel size.
+RenderVolume sampledVolume(const ScriptScene& scene, float voxelSize, const PictureOptions& picture,
+                           Run& run) {
+  BakeOptions baking{.voxelSize = voxelSize, .box = scene.box, .background = 0.0f};
+  VolumePart part;
+  run.begin("sample");
+  part.density = bakeGrid(max(scene.density, 0.0f), baking, run);
+  // Where there is nothing, nobody asks for its colour.
+  if (scene.color) part.colour = threeGrids(*scene.color * mask(scene.density), baking, run);
+  if (scene.emission) part.emission = threeGrids(notNegative(*scene.emission), baking, run);
+  if (scene.temperature) part.temperature = bakeGrid(max(*scene.temperature, 0.0f), baking, run);
+  part.temperatureScale = 1.0f;
+  part.emissionScale = float(picture.volumes.emissionScale);
+  if (scene.velocity) {
+    const BakeOptions coarse{.voxelSize = std::max(voxelSize, scene.box.longestSide() / kSlow),
+                             .box = scene.box.expanded(0.25f * scene.box.longestSide()),
+                             .background = 0.0f};
+    part.velocity =
+        threeGrids(*scene.velocity * ScalarField(float(picture.volumes.velocityScale)), coarse, run);
+    part.shutter = picture.shutter;
+  }
+  if (!picture.volumes.densityScales.empty()) part.share = float(picture.volumes.densityScales[0]);
+  check(part);
+  return combine({part}, run);
+}
+
+}  // namespace
+
+void addScriptOptions(CLI::App& app, ScriptOptions& options) {
+  using Detail = ScriptOptions::Detail;
+  addChoice<Detail>(app, "--detail", options.detail, {{"camera", Detail::camera}, {"exact", Detail::exact}},
+                    "How a script is looked at: sampled as finely as the picture shows it, or asked by every "
+                    "ray, without a grid.");
+  app.add_option("--set", options.settings, "A parameter of the script; may be given again.")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->each([](const std::string& text) {
+        if (text.find('=') == std::string::npos || text.starts_with('='))
+          refuseValue("--set", text, "NAME=VALUE, as in gain=2");
+      });
+}
+
+bool isScript(const std::vector<std::string>& paths) {
+  const auto script = std::find_if(paths.begin(), paths.end(),
+                                   [](const std::string& path) { return path.ends_with(".felt"); });
+  if (script == paths.end()) return false;
+  if (paths.size() > 1)
+    throw Error(*script +
+                ": a script is looked at alone; it can read the other files itself, by readfield(...)");
+  return true;
+}
+
+RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture,
+                          Run& run) {
+  const ScriptScene scene = runScript(path, options, picture, run);
+  if (scene.extinction && !picture.extinction) {
+    if (!(*scene.extinction >= 0 && *scene.extinction <= 1e9))
+      throw Error(fmt::format("{}: 'extinction' is {:g}, allowed: 0 to 1e9", path, *scene.extinction));
+    picture.extinction = float(*scene.extinction);
+  }
+  const bool isExact = options.detail == ScriptOptions::Detail::exact;
+  if (isExact && scene.hasOthers())
+    throw Error(path +
+                ": --detail exact shows a density alone, without color, emission, temperature or velocity; "
+                "--detail camera shows them");
+  return namingFile(path, [&] {
+    // What the camera frames shows only once the script has been looked at.
+    const float side = scene.box.longestSide();
+    const RenderVolume coarse =
+        sampledVolume({scene.density, scene.box, {}, {}, {}, {}, {}}, side / kCoarse, picture, run);
+    if (coarse.isEmpty()) return coarse;
+    const Camera camera = static_cast<const CameraOptions&>(picture).placed(extentOf(coarse), run).camera();
+    FieldVolumeOptions field{.box = scene.box,
+                             .voxelsPerPixel = isExact ? 0.5f : 1.0f,
+                             .mostBytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes)};
+    if (scene.hasOthers()) field.mostBytes /= 4;
+    const float voxelSize = fieldVoxelSize(scene.density, camera, field, run);
+    run.detail(
+        fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path, voxelSize, side / voxelSize));
+    run.stats["script"] = {{"voxel_size", voxelSize}, {"exact", isExact}};
+    return isExact ? gridlessVolume(scene.density, scene.box, voxelSize, run)
+                   : sampledVolume(scene, voxelSize, picture, run);
+  });
+}
+
+}  // namespace nephele::apps
