@@ -84,6 +84,10 @@ int runWork(const std::string& who, ProgramRun& run, const CommonOptions& option
   } catch (const std::bad_alloc&) {
     run.finish();
     std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
+  } catch (const felt::ScriptError& error) {
+    run.finish();
+    std::cerr << error.what() << '\n';
+    return error.isOfScript() ? kUsage : kFailed;
   } catch (const SeveralErrors& errors) {
     run.finish();
     for (const std::string& message : errors.messages()) printError(who, message);

@@ -28,10 +28,9 @@ Mesh solidOf(const ScalarField& blade, const std::string& text, const Box& box, 
       *bakeGrid(solid, {.voxelSize = voxel, .box = room.expanded(2 * voxel), .band = {-3 * voxel, 3 * voxel}},
                 run),
       0.0f, run);
-  if (mesh.faceCount() == 0 ||
-      signedVolume(mesh) > 0.9999 * double(room.size().x) * double(room.size().y) * double(room.size().z))
-    throw Error(fmt::format("--knife: '{}' is {} everywhere in the shape's box: it has no blade there", text,
-                            mesh.faceCount() == 0 ? "negative" : "positive"));
+  if (mesh.faceCount() == 0)
+    throw Error(
+        fmt::format("--knife: '{}' is negative everywhere in the shape's box: it has no blade there", text));
   return mesh;
 }
 
