@@ -130,6 +130,13 @@ ShapePtr surface(const Context& context, const S& level, std::int64_t resolution
   return shapeOf(marchingCubes(*grid, 0, *context.progress), "surface");
 }
 
+/// @throws CallError if a level set of that mesh takes more memory than is allowed.
+void requireRoomForBand(const Mesh& solid, double voxelSize, const Context& context) {
+  // What is made of a level set is there beside it.
+  requireBytes(2 * estimateLevelSetBytes(solid, {.voxelSize = voxelSize}), "the level set of the shape",
+               "use larger voxels", context);
+}
+
 S distanceTo(const Context& context, const Shape& shape, double voxelSize, const Mesh& solid) {
   const double reach = double(boundingBox(solid).longestSide()) / 2;
   if (!(voxelSize < reach / 2))
@@ -137,6 +144,7 @@ S distanceTo(const Context& context, const Shape& shape, double voxelSize, const
         Code::outOfRange,
         fmt::format("voxel is {:g}, and must be below a quarter of the shape's longest side, {:g}", voxelSize,
                     reach / 2));
+  requireRoomForBand(solid, voxelSize, context);
   const S level = namingFile(shape.name, [&] {
     return meshDistance(solid, {.voxelSize = voxelSize, .exteriorBand = reach, .interiorBand = reach},
                         *context.progress);
@@ -151,6 +159,7 @@ std::vector<Value> cut(const Context& context, const Shape& shape, const Array& 
   Knives blades;
   for (const Value& knife : *knives) blades.fields.emplace_back(knife.as<S>());
   const double voxel = double(boundingBox(solid).longestSide()) / voxels;
+  requireRoomForBand(solid, voxel, context);
   const auto level = toBricks(meshToLevelSet(solid, {.voxelSize = voxel}, *context.progress));
   CutOptions options;
   options.kerf = static_cast<float>(kerf);

@@ -107,6 +107,15 @@ TEST(FeltShapes, AreRefusedInWords) {
       "s.felt:1:11: error: what is inside has no end, or its ranges show none within 500 000 of the origin\n"
       "  shape s = ls2shape(plane((0,0,0), (0,1,0)));\n            ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\n"
       "  hint: multiply it by a mask, or say within which domain to look");
+  EXPECT_NE(refusal("scalarfield l = shape2ls(ls2shape(sphere((0,0,0), 1), 32), voxel = 1e-5);")
+                .find("error: the level set of the shape may take"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal("shape[] p = cut(ls2shape(sphere((0,0,0), 1), 32), [identity().x], kerf = -1);").find("kerf"),
+      std::string::npos);
+  EXPECT_NE(
+      refusal("scalarfield f = attribute(ls2shape(sphere((0,0,0), 1), 32), \"wetness\");").find("wetness"),
+      std::string::npos);
   EXPECT_EQ(refusal("shape s = ls2shape(sphere((0,0,0), 1) - 2);"),
             "s.felt:1:11: error: the field is nowhere above 0, so that there is no shape\n"
             "  shape s = ls2shape(sphere((0,0,0), 1) - 2);\n            ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~\n"
