@@ -364,3 +364,9 @@ if picture transfer; then
     --bake-texture striped_whale.png --bake-size 1024x1024 --preview tutorial_06_whale.png $view
   keep tutorial_06_whale.png
 fi
+
+if picture fireball; then
+  "$program" render felt/fireball.felt --preview fireball.png --size 960x600 --quiet
+  oiiotool fireball.png --quality 90 -o fireball.jpg
+  keep fireball.jpg
+fi
