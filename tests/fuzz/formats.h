@@ -47,6 +47,7 @@ void useDeepPicture(const Input& input);
 void useCamera(const Input& input);
 void useToml(const Input& input);
 void useFieldTexts(const Input& input);
+void useScript(const Input& input);
 /// The bytes are no file but say which calls write some, in which order.
 void useCalls(const Input& input);
 

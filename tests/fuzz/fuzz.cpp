@@ -36,6 +36,7 @@ constexpr Format kFormats[] = {
     {"camera", ".json", useCamera},
     {"toml", ".toml", useToml},
     {"field", ".txt", useFieldTexts},
+    {"felt", ".felt", useScript},
     {"calls", ".bin", useCalls},
 };
 

@@ -309,6 +309,28 @@ void writePictureSeeds(const std::string& parent) {
   hdr.write("runs.hdr", runs);
 }
 
+void writeScriptSeeds(const std::string& parent) {
+  const Folder felt(parent, "felt");
+  felt.write("values.felt",
+             "int[] a; for (int i = 0; i < 5; i++) { a[i] = i % 3; if (a[i] == 2) continue; }\n"
+             "vector v = (1, 2.5, -3e-1); matrix m = ((1,0,0), (0,1,0), (0,0,1));\n"
+             "print(a, v * v, m * v, v.x ^ 2, size(a) > 2 && !false ? \"yes\" : \"no\", 2.5%, 6x);\n");
+  felt.write(
+      "functions.felt",
+      "param float gain = 1.5 in [0, 4] \"how much\"; /* a comment */\n"
+      "func scalarfield[] layers(scalarfield noise, int count, float rough = 0.5) {\n"
+      "  scalarfield[] all = []; scalarfield scale = scalarfield(1.0);\n"
+      "  while (size(all) < count) { all[size(all)] = compose(noise, P * 2) * scale; scale *= rough; }\n"
+      "  return all;\n}\n"
+      "scalarfield[] some = layers(noise(\"simplex\", seed = 3), 3); // and more\n"
+      "vectorfield map = advect(identity(), curlnoise(frequency = 2), gain);\n");
+  felt.write("fields.felt",
+             "scalarfield l = union(sphere((0,0,0), 1), box((1,0,0), (1,1,1))) + 0.1 * abs(perlin(4));\n"
+             "vectorfield n = -grad(l) / sqrt(grad(l) * grad(l)); matrixfield h = grad(grad(l));\n"
+             "domain d((-1,-1,-1), (2,2,2), (0,0,0), 0.5, 0.5, 0.5); scalarcache c(d);\n"
+             "scalarfield f = (mask(l) * l.x - n[1]) ^ 0.5 + n * h * n; bool b = 1.0 / 3 < 7 / 2;\n");
+}
+
 void writeTextSeeds(const std::string& parent) {
   const Folder chan(parent, "chan"), camera(parent, "camera"), toml(parent, "toml"), field(parent, "field"),
       calls(parent, "calls");
@@ -350,6 +372,7 @@ void writeSeeds(const std::string& folder) {
   writeMeshSeeds(folder);
   writeVolumeSeeds(folder);
   writePictureSeeds(folder);
+  writeScriptSeeds(folder);
   writeTextSeeds(folder);
 }
 
