@@ -91,17 +91,17 @@ Function& Registry::add(std::string signature, std::string text, std::string exa
       return std::is_same_v<std::tuple_element_t<0, All>, Context>;
   }();
   constexpr std::size_t kFirst = kWantsContext ? 1 : 0;
-  constexpr auto kArguments = std::make_index_sequence<std::tuple_size_v<All> - kFirst>();
+  using Indices = std::make_index_sequence<std::tuple_size_v<All> - kFirst>;
   Function& added =
       addGeneral(std::move(signature), std::move(text), std::move(example), [function](Call& call) -> Value {
         if constexpr (std::is_void_v<typename Described::Returned>) {
-          detail::invoked<kWantsContext, All>(function, call, kArguments);
+          detail::invoked<kWantsContext, All>(function, call, Indices());
           return {};
         } else {
-          return Value(detail::invoked<kWantsContext, All>(function, call, kArguments));
+          return Value(detail::invoked<kWantsContext, All>(function, call, Indices()));
         }
       });
-  requireKinds(added, detail::typesOf<kFirst, All>(kArguments));
+  requireKinds(added, detail::typesOf<kFirst, All>(Indices()));
   return added;
 }
 

@@ -1,6 +1,7 @@
 // Expressions of Felt where options take values that vary, and scripts as what is looked at.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -138,6 +139,34 @@ TEST(Scripts, AreLookedAt) {
   EXPECT_EQ(runProgram(command + " --set radios=1").exitCode, 1);
   EXPECT_EQ(runProgram(command + " --detail exact").exitCode, 1) << "colours need a grid";
   EXPECT_EQ(runProgram("render " + script + " " + script + " -o " + picture).exitCode, 1);
+}
+
+TEST(Expressions, ColourVolumes) {
+  const TemporaryFolder folder;
+  grown(folder, "");
+  const auto picture = [&](const std::string& options) {
+    const ProgramResult result =
+        runProgram("render " + folder.file("cloud.vdb") + " -o " + folder.file("p.exr") +
+                   " --size 48x32 --samples 1 --no-backdrop --sky 1,1,1 --sun none " + options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    const Image image = readImage(folder.file("p.exr"));
+    std::array<double, 3> sums{};
+    for (std::size_t c = 0; c < 3; ++c)
+      for (const float value : image.find(std::string(1, "RGB"[c]))->values) sums[c] += double(value);
+    return sums;
+  };
+  const auto white = picture(""), red = picture("--color '=(1, 0.6, 0.2)'");
+  EXPECT_NEAR(red[0], white[0], 0.01 * white[0]);
+  EXPECT_LT(red[1], 0.9 * white[1]);
+  EXPECT_LT(red[2], 0.8 * red[1]);
+  EXPECT_EQ(runProgram("render " + folder.file("cloud.vdb") + " --preview " + folder.file("p.png") +
+                       " --color 1,0,0")
+                .exitCode,
+            2);
+  EXPECT_EQ(runProgram("render " + folder.file("cloud.vdb") + " --preview " + folder.file("p.png") +
+                       " --color '=P.x'")
+                .exitCode,
+            2);
 }
 
 // A ball is the same ball whoever samples it: pictures differ by what a pixel may.

@@ -5,9 +5,12 @@
 #include <optional>
 #include <utility>
 
+#include "apps/options/expression_names.h"
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/field/operations.h"
 #include "nephele/render/volume/volume_parts.h"
 
 namespace nephele::apps {
@@ -61,6 +64,23 @@ T entryOf(const std::vector<T>& list, std::size_t index, const T& standard) {
   return list.empty() ? standard : list[list.size() > 1 ? index : 0];
 }
 
+// Colours of an expression, where the density has samples, and a little beyond, so that no edge is darker.
+VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& density, Run& run) {
+  // Colours change over shapes, not within their detail.
+  constexpr float kAcross = 192;
+  const Box box = density.worldBox();
+  const float side = box.longestSide(), voxel = std::max(side / kAcross, density.voxelSize());
+  const double frame = run.part && run.part->frame ? double(*run.part->frame) : 0.0;
+  const VectorField color = evaluated("--color", expression, {felt::Kind::vectorField},
+                                      namesOfPlace(frame, 0), run.longestSide(box))
+                                .as<VectorField>();
+  VolumePart::Grids grids;
+  for (std::size_t c = 0; c < 3; ++c)
+    grids[c] = bakeGrid(clamp(component(color, int(c)), 0, 1),
+                        {.voxelSize = voxel, .box = box.expanded(2 * voxel), .background = 0.0f}, run);
+  return grids;
+}
+
 VolumePart readPart(const std::string& path, std::size_t index, const VolumeOptions& options,
                     const VolumeReading& reading, Run& run) {
   const auto nameIn = [&](const std::vector<std::string>& names) {
@@ -84,6 +104,8 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   part.density = readFog(path, nameIn(options.densityGrids), run, made);
   if (const std::string name = nameIn(options.colourGrids); !name.empty())
     part.colour = readThree(path, name);
+  else if (!options.color.empty())
+    part.colour = colourOf(options.color, *part.density, run);
   if (const std::string name = nameIn(options.emissionGrids); !name.empty())
     part.emission = readGlow(path, name, run);
   if (const std::string name = nameIn(options.temperatureGrids); !name.empty())
@@ -118,6 +140,18 @@ void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
           "Density in the file; several names are for one volume after the other, here and below.")
       ->default_str("the first grid that holds numbers");
   addGrid("--color-grid", options.colourGrids, "Colours, 0 to 1, that multiply the albedo: 'Cd'.");
+  app.add_option_function<std::string>(
+         "--color",
+         [&options](const std::string& text) {
+           if (!text.starts_with('='))
+             refuseValue("--color", text, "an expression of P, time and seed after =, as in =(1, 0.5, 0.2)");
+           options.color = text.substr(1);
+           checkedExpression("--color", options.color, {felt::Kind::vectorField}, namesOfPlace(0, 0));
+         },
+         "Color, 0 to 1, that multiplies the albedo where there is no --color-grid, as a vector of P, time "
+         "and seed.")
+      ->type_name("=EXPRESSION")
+      ->default_str("none");
   addGrid("--emission-grid", options.emissionGrids,
           "Numbers or colours that glow: as bright as this where density 1 is opaque.");
   addGrid("--temperature-grid", options.temperatureGrids,

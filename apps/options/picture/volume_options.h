@@ -13,6 +13,8 @@ namespace nephele::apps {
 struct VolumeOptions {
   /// Names for every volume in turn, or one for all; "none" for no grid.
   std::vector<std::string> densityGrids, colourGrids, emissionGrids, temperatureGrids, velocityGrids;
+  /// An expression that multiplies the albedo, or "".
+  std::string color;
   /// Likewise.
   std::vector<double> densityScales;
   double emissionScale = 1, temperatureScale = 2000;
@@ -21,7 +23,7 @@ struct VolumeOptions {
 
   /// Whether anything but densities is looked at.
   bool hasOthers() const {
-    return !(colourGrids.empty() && emissionGrids.empty() && temperatureGrids.empty() &&
+    return !(color.empty() && colourGrids.empty() && emissionGrids.empty() && temperatureGrids.empty() &&
              velocityGrids.empty());
   }
 };
