@@ -24,9 +24,6 @@
 namespace nephele::apps {
 namespace {
 
-constexpr int kFailed = 1;
-constexpr int kUsage = 2;
-
 std::string quoted(const std::string& argument) {
   const bool plain =
       !argument.empty() && argument.find_first_of(" \t\n'\"\\$*?&;|<>()#") == std::string::npos;
@@ -84,6 +81,9 @@ int runWork(const std::string& who, ProgramRun& run, const CommonOptions& option
   } catch (const std::bad_alloc&) {
     run.finish();
     std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
+  } catch (const AlreadyTold& told) {
+    run.finish();
+    return told.exitCode;
   } catch (const felt::ScriptError& error) {
     run.finish();
     std::cerr << error.what() << '\n';

@@ -81,6 +81,14 @@ class SeveralErrors : public Error {
   std::vector<std::string> messages_;
 };
 
+/// Exit codes of a run that failed, and of a command line or a script that cannot be used.
+inline constexpr int kFailed = 1, kUsage = 2;
+
+/// Ends a run whose faults have been printed already.
+struct AlreadyTold {
+  int exitCode = kFailed;
+};
+
 /// The metadata that holds Run::Part::digest.
 inline constexpr const char* kPartDigest = "nephele:options";
 
@@ -129,6 +137,7 @@ Verb transformVerb();
 Verb renderVerb();
 Verb turntableVerb();
 Verb infoVerb();
+Verb feltVerb();
 
 /// Parses the command line, runs one verb, and returns the exit code: 0 success, 1 failed, 2 usage, 128 +
 /// signal where a signal stopped it.

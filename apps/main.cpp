@@ -6,5 +6,5 @@ int main(int argc, char** argv) {
   nephele::returnLargeBlocksAtOnce();
   return runProgram(argc, argv,
                     {levelsetVerb(), cloudVerb(), advectVerb(), wispsVerb(), meshVerb(), cutVerb(),
-                     transferVerb(), transformVerb(), renderVerb(), turntableVerb(), infoVerb()});
+                     transferVerb(), transformVerb(), renderVerb(), turntableVerb(), infoVerb(), feltVerb()});
 }

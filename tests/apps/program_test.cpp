@@ -19,12 +19,12 @@ TEST(Program, PrintsItsVersionAndVerbs) {
   EXPECT_EQ(runProgram("--version").exitCode, 0);
   const ProgramResult help = runProgram("--help");
   EXPECT_EQ(help.exitCode, 0);
-  for (const char* verb : {"levelset", "cloud", "mesh", "render", "info"})
+  for (const char* verb : {"levelset", "cloud", "mesh", "render", "info", "felt"})
     EXPECT_NE(help.output.find(verb), std::string::npos) << verb;
 }
 
 TEST(Program, HelpOfEveryVerbShowsAnExample) {
-  for (const std::string verb : {"levelset", "cloud", "mesh", "render", "info"}) {
+  for (const std::string verb : {"levelset", "cloud", "mesh", "render", "info", "felt"}) {
     const ProgramResult help = runProgram(verb + " --help-all");
     EXPECT_EQ(help.exitCode, 0) << verb;
     EXPECT_NE(help.output.find("Example:\n  nephele " + verb), std::string::npos) << help.output;
@@ -41,7 +41,7 @@ int optionsShown(const std::string& help) {
 
 TEST(Program, HelpShowsTheOptionsOfAFirstDayAndLeadsToAll) {
   for (const std::string verb :
-       {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render", "turntable", "info"}) {
+       {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render", "turntable", "info", "felt"}) {
     const ProgramResult help = runProgram(verb + " --help"), all = runProgram(verb + " --help-all");
     EXPECT_EQ(help.exitCode, 0) << verb;
     // Fifteen or so, three of help, and --frames and --wedge.

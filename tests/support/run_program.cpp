@@ -40,10 +40,10 @@ std::string programPath() {
   return NEPHELE_PROGRAM;
 }
 
-ProgramResult runProgram(const std::string& arguments, const std::string& before) {
+ProgramResult runProgram(const std::string& arguments, const std::string& before, const std::string& input) {
   const TemporaryFolder folder;
   const std::string command = before + " '" + programPath() + "' " + arguments + " >'" + folder.file("out") +
-                              "' 2>'" + folder.file("err") + "' </dev/null";
+                              "' 2>'" + folder.file("err") + "' <'" + input + "'";
   const int status = std::system(command.c_str());
   ProgramResult result;
   result.exitCode = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -33,8 +33,9 @@ struct ProgramResult {
 std::string programPath();
 
 /// Runs `nephele <arguments>` through the shell and returns what it said. `before` goes in front of the
-/// command line ("ulimit -f 8;").
-ProgramResult runProgram(const std::string& arguments, const std::string& before = {});
+/// command line ("ulimit -f 8;"). The standard input is the file `input`.
+ProgramResult runProgram(const std::string& arguments, const std::string& before = {},
+                         const std::string& input = "/dev/null");
 
 /// A file of the checkout, e.g. "data/sphere_uv.obj".
 std::string ownData(const std::string& name);

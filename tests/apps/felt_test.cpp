@@ -1,0 +1,189 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_program.h"
+#include "tests/support/test_data.h"
+
+namespace nephele::test {
+namespace {
+
+// Places are counted in the texts of the scripts; values follow from arithmetic.
+class FeltVerb : public ::testing::Test {
+ protected:
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_.file(name)) << text;
+    return folder_.file(name);
+  }
+  std::string script(const std::string& text) const { return write("script.felt", text); }
+  ProgramResult piped(const std::string& arguments, const std::string& text) const {
+    return runProgram(arguments, {}, write("input", text));
+  }
+
+  TemporaryFolder folder_;
+};
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST_F(FeltVerb, RunsAScriptAndPrintsWhatItPrints) {
+  const ProgramResult result =
+      runProgram("felt run " + script("print(\"a\", 1 + 2);\nprint((1, 2, 3) * 2);\n"));
+  EXPECT_EQ(result.exitCode, 0);
+  EXPECT_EQ(result.output, "a 3\n(2, 4, 6)\n");
+  EXPECT_EQ(result.errors, "");
+}
+
+TEST_F(FeltVerb, ReadsAScriptFromTheStandardInput) {
+  const ProgramResult result = piped("felt run -", "print(7);");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_EQ(result.output, "7\n");
+}
+
+TEST_F(FeltVerb, SetsParameters) {
+  const std::string path = script(
+      "param float gain = 1 in [0, 4] \"how bright\";\nparam string kind = "
+      "\"perlin\" in [\"perlin\", \"worley\"];\nprint(gain, kind);\n");
+  EXPECT_EQ(runProgram("felt run " + path + " --set gain=2.5 --set kind=worley").output, "2.5 worley\n");
+  const ProgramResult unknown = runProgram("felt run --set gian=2 " + path);
+  EXPECT_EQ(unknown.exitCode, 2);
+  EXPECT_TRUE(contains(unknown.errors, "--set: " + path + " has no parameter 'gian'; did you mean 'gain'?"))
+      << unknown.errors;
+  const ProgramResult outside = runProgram("felt run " + path + " --set gain=9");
+  EXPECT_EQ(outside.exitCode, 2);
+  EXPECT_TRUE(contains(outside.errors, "setting gain:1:1: error: 'gain' is 9, and may be from 0 to 4"))
+      << outside.errors;
+  const ProgramResult noValue = runProgram("felt run " + path + " --set gain");
+  EXPECT_EQ(noValue.exitCode, 2);
+  EXPECT_TRUE(contains(noValue.errors, "allowed: NAME=VALUE")) << noValue.errors;
+}
+
+TEST_F(FeltVerb, TellsWhereAFaultIs) {
+  const std::string path = script("scalarfield a = 1;\nscalarfield b = spere((0,0,0), 1);\n");
+  const ProgramResult result = runProgram("felt run " + path);
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(result.errors.starts_with(path + ":2:17: error: ")) << result.errors;
+  EXPECT_TRUE(contains(result.errors, "did you mean `sphere`?")) << result.errors;
+  EXPECT_EQ(result.output, "");
+}
+
+TEST_F(FeltVerb, RefusesAScriptThatIsCutOff) {
+  const std::string path = script("func float f(float x) {\n  return x +");
+  const ProgramResult result = runProgram("felt run " + path);
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(contains(result.errors, path + ":2:")) << result.errors;
+}
+
+TEST_F(FeltVerb, NamesAFileThatIsNotThere) {
+  for (const char* action : {"run", "check", "format"}) {
+    const std::string path = folder_.file("none.felt");
+    const ProgramResult result = runProgram(std::string("felt ") + action + " " + path);
+    EXPECT_EQ(result.exitCode, 1);
+    EXPECT_EQ(result.errors, "nephele felt: error: " + path + ": cannot be opened for reading\n");
+  }
+}
+
+TEST_F(FeltVerb, DataAtFaultIsNoFaultOfTheScript) {
+  const ProgramResult result = runProgram("felt run " + script("error(\"the wind is too strong\");"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_TRUE(contains(result.errors, "script.felt:1:1: error: the wind is too strong")) << result.errors;
+}
+
+TEST_F(FeltVerb, EndsWhatHasNoEnd) {
+  const std::string path = script("int i = 0;\nwhile (true) i = i + 1;\n");
+  const ProgramResult result = runProgram("felt run " + path + " --max-statements 1000");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(contains(result.errors, "1000")) << result.errors;
+  EXPECT_EQ(runProgram("felt run " + path + " --max-statements 0").exitCode, 2);
+}
+
+TEST_F(FeltVerb, ChecksWithoutRunning) {
+  const std::string good = script("print(1);\n"), bad = write("bad.felt", "int a = 1.5;\n");
+  const ProgramResult result = runProgram("felt check " + good + " " + bad + " --json");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_EQ(result.output, "");
+  const nlohmann::json fault = nlohmann::json::parse(result.errors);
+  EXPECT_EQ(fault["file"], bad);
+  EXPECT_EQ(fault["line"], 1);
+  EXPECT_EQ(fault["column"], 9);
+  EXPECT_EQ(fault["endColumn"], 12);
+  EXPECT_EQ(fault["severity"], "error");
+  EXPECT_EQ(fault["code"], "wrong-type");
+  EXPECT_EQ(runProgram("felt check " + good).exitCode, 0);
+}
+
+TEST_F(FeltVerb, ExplainsFieldsAndCaches) {
+  const std::string path = script(
+      "param float gain = 2 in [0, 4] \"how bright\";\n"
+      "scalarfield density = gain * mask(sphere((0,0,0), 1));\n"
+      "scalarcache held(domain((0,0,0), (1,2,1), 0.25));\n");
+  const ProgramResult result =
+      runProgram("felt run " + path + " --explain --stats " + folder_.file("stats.json"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_TRUE(contains(result.output, "param float gain = 2 in [0, 4]: how bright\n")) << result.output;
+  EXPECT_TRUE(contains(result.output, "held: scalarcache of 4 x 8 x 4 cells")) << result.output;
+  EXPECT_TRUE(contains(result.output, "between (0, 0, 0) and (1, 2, 1)")) << result.output;
+  const nlohmann::json stats = nlohmann::json::parse(textOf(folder_.file("stats.json")));
+  ASSERT_EQ(stats["fields"].size(), 1u);
+  // A sphere, its mask, the gain and the product.
+  EXPECT_EQ(stats["fields"][0]["operations"], 4);
+  EXPECT_GT(stats["fields"][0]["nanoseconds_per_point"].get<double>(), 0.0);
+  EXPECT_EQ(stats["caches"][0]["cells"], (nlohmann::json{4, 8, 4}));
+}
+
+TEST_F(FeltVerb, FormatsInPlaceAndOnlyOnce) {
+  const std::string path = script("float   a=3;   // three\nif(a>2){print(a);}\n");
+  EXPECT_EQ(runProgram("felt format " + path + " --check").exitCode, 1);
+  const ProgramResult shown = runProgram("felt format " + path + " --stdout");
+  EXPECT_EQ(shown.exitCode, 0) << shown.errors;
+  EXPECT_EQ(textOf(path), "float   a=3;   // three\nif(a>2){print(a);}\n");
+  EXPECT_EQ(runProgram("felt format " + path).exitCode, 0);
+  EXPECT_EQ(textOf(path), shown.output);
+  EXPECT_EQ(runProgram("felt format " + path + " --check").exitCode, 0);
+  EXPECT_EQ(runProgram("felt format " + path).output, "");
+  EXPECT_EQ(piped("felt format -", "float   a=3;").output, "float a = 3;\n");
+}
+
+TEST_F(FeltVerb, FormatsNothingThatDoesNotClose) {
+  const std::string path = script("print(\"a);\n");
+  EXPECT_EQ(runProgram("felt format " + path).exitCode, 2);
+  EXPECT_EQ(textOf(path), "print(\"a);\n");
+}
+
+TEST_F(FeltVerb, FindsFunctionsByWords) {
+  const ProgramResult found = runProgram("felt functions divergence");
+  EXPECT_EQ(found.exitCode, 0);
+  EXPECT_TRUE(contains(found.output, "vectorfield curlnoise(")) << found.output;
+  EXPECT_TRUE(contains(found.output, "e.g. ")) << found.output;
+  EXPECT_FALSE(contains(found.output, "operator"));
+  const ProgramResult near = runProgram("felt functions shpere");
+  EXPECT_EQ(near.exitCode, 1);
+  EXPECT_TRUE(contains(near.errors, "did you mean 'sphere'?")) << near.errors;
+}
+
+TEST_F(FeltVerb, RefusesOptionsOfOtherActions) {
+  const ProgramResult result = runProgram("felt check " + script("print(1);") + " --explain");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(contains(result.errors, "--explain: goes with run only")) << result.errors;
+  EXPECT_EQ(runProgram("felt").exitCode, 2);
+  EXPECT_EQ(runProgram("felt run").exitCode, 2);
+  EXPECT_EQ(runProgram("felt run a.felt b.felt").exitCode, 2);
+  EXPECT_EQ(runProgram("felt dance").exitCode, 2);
+}
+
+TEST_F(FeltVerb, RunsTheScriptsOfTheProject) {
+  for (const auto& entry : std::filesystem::directory_iterator(ownData("data/felt"))) {
+    if (entry.path().extension() != ".felt") continue;
+    const std::string path = entry.path().string();
+    const ProgramResult checked = runProgram("felt check " + path);
+    EXPECT_EQ(checked.exitCode, 0) << checked.errors;
+    EXPECT_EQ(checked.errors, "");
+    const ProgramResult result = runProgram("felt format --check " + path);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+  }
+}
+
+}  // namespace
+}  // namespace nephele::test
