@@ -1,7 +1,7 @@
 #!/bin/sh
 # Puts the program's own --help-all text into the pages of its verbs, between the marks
 #   <!-- help VERB -->  and  <!-- end of help -->
-# With --check it changes nothing and fails where a page is out of date. It also checks that local links lead somewhere.
+# and the list of what scripts may call into felt_functions.md. With --check it changes nothing and fails where a page is out of date. It also checks that local links lead somewhere.
 # Usage: update_help.sh PROGRAM [--check]
 set -eu
 program=$1
@@ -29,6 +29,19 @@ for page in *.md; do
   fi
   rm -f "$fresh" "$fresh.help"
 done
+
+fresh=$(mktemp)
+"$program" felt functions --markdown >"$fresh"
+if ! cmp -s felt_functions.md "$fresh"; then
+  if [ "$mode" = --check ]; then
+    echo "error: docs/felt_functions.md does not list the current functions; run make docs" >&2
+    failed=1
+  else
+    cat "$fresh" >felt_functions.md
+    echo "docs/felt_functions.md: updated"
+  fi
+fi
+rm -f "$fresh"
 
 for page in *.md ../README.md; do
   for target in $(grep -oE '\]\([^)#: ]+(#[^)]*)?\)' "$page" | sed -E 's/^\]\(//; s/(#[^)]*)?\)$//'); do

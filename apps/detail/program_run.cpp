@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -20,6 +21,8 @@ namespace {
 volatile std::sig_atomic_t receivedSignal = 0;
 
 extern "C" void onStopSignal(int signal) {
+  // What it interrupts may be about to look at it.
+  const int error = errno;
   if (receivedSignal != 0) {
     discardAllOutputs();
     // Only what signal handlers may call.
@@ -28,6 +31,7 @@ extern "C" void onStopSignal(int signal) {
     _exit(128 + signal);
   }
   receivedSignal = signal;
+  errno = error;
 }
 
 /// On stderr. What cannot be printed is lost: a note must not fail a job.

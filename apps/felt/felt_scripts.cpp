@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "apps/felt/explain.h"
+#include "apps/options/expression_names.h"
 #include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/text_file.h"
@@ -33,7 +34,7 @@ void tell(const felt::ScriptError& error, bool asJson) {
 }
 
 felt::Program checked(const ScriptText& script) {
-  return felt::Program(script.name, script.text, feltFunctions());
+  return felt::Program(script.name, script.text, feltFunctions(), namesOfPlace(0, 0).given);
 }
 
 /// --set as the names and expressions that they hold. @throws CLI::ValidationError

@@ -1,6 +1,7 @@
 #include "apps/app.h"
 #include "apps/felt/felt_scripts.h"
 #include "apps/felt/function_list.h"
+#include "apps/felt/repl.h"
 #include "apps/options/felt_options.h"
 
 namespace nephele::apps {
@@ -19,7 +20,7 @@ void doAction(const FeltArguments& arguments, Run& run) {
     case Action::format:
       return formatScripts(arguments, run);
     case Action::repl:
-      return;
+      return answerLines(arguments.limits(), run);
   }
 }
 
@@ -36,8 +37,8 @@ constexpr const char* kActions =
 
 Verb feltVerb() {
   return verbOf("felt", "Runs, checks and formats scripts of fields.",
-                "nephele felt run data/felt/cumulus.felt --set billow=0.3 --explain", addFeltOptions, doAction,
-                kActions);
+                "nephele felt run data/felt/cumulus.felt --set billow=0.3 --explain", addFeltOptions,
+                doAction, kActions);
 }
 
 }  // namespace nephele::apps

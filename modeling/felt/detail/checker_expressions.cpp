@@ -70,7 +70,8 @@ std::string typesOf(const Expression& call) {
   return text + ")";
 }
 
-/// What it costs to hand `part` to a parameter: elements of an array that stands there are converted one by one.
+/// What it costs to hand `part` to a parameter: elements of an array that stands there are converted one by
+/// one.
 std::optional<int> argumentCost(const Expression& part, const Type& to) {
   const bool isEmptyArray = part.kind == ExpressionKind::array && part.parts.empty();
   if (isEmptyArray && to.isArray) return 0;

@@ -145,12 +145,13 @@ void Interpreter::declaration(const Statement& statement) {
   }
 }
 
-Value Interpreter::remembered(Value value, bool isGlobal, int slot) const {
+Value Interpreter::remembered(Value value, bool isGlobal, int slot) {
   // Constants and the point itself, of depth 0, cost no more than what would be remembered.
   if (nodeOf(value) == nullptr || value.depth == 0 || value.isRemembered) return value;
   const Variable& variable = isGlobal ? checker_.globals()[slot] : checker_.locals(*function_)[slot];
   if (variable.reads < 2) return value;
   const int depth = value.depth;
+  const void* const node = nodeOf(value);
   if (value.is<ScalarField>())
     value = memo(value.as<ScalarField>());
   else if (value.is<VectorField>())
@@ -159,6 +160,9 @@ Value Interpreter::remembered(Value value, bool isGlobal, int slot) const {
     value = memo(value.as<MatrixField>());
   value.depth = depth + 1;
   value.isRemembered = true;
+  // It counts as the operation that it remembers.
+  if (const auto made = made_.find(node); keepsParts_ && made != made_.end())
+    made_.emplace(nodeOf(value), Made{value, made->second.parts});
   return value;
 }
 

@@ -56,7 +56,7 @@ class Interpreter {
   Value callOwn(const Expression& call);
   Value element(const Expression& expression);
   Value& variable(bool isGlobal, int slot) { return isGlobal ? globals_[slot] : locals_[frame_ + slot]; }
-  Value remembered(Value value, bool isGlobal, int slot) const;
+  Value remembered(Value value, bool isGlobal, int slot);
   double longestSide(const Expression& expression) const;
   void countStatement(const Span& span);
 
