@@ -1,8 +1,8 @@
 #!/bin/sh
 # Renders the pictures of clouds in docs/pictures again, by the commands of the pages that show them. Volumes stay in FOLDER, and what is
 # there is not grown again; pictures always are. NAME (tutorial_01, lights ...) makes only that picture; without one it makes all of them.
-# Needs oiiotool (Debian's openimageio-tools) and the models of examples/ (make examples). All pictures of animals are of these, but
-# mesh_decimated.png and tutorial_05.jpg, which are of the Stanford bunny.
+# Needs oiiotool (Debian's openimageio-tools) and the models of examples/ (make examples). With DISNEY=FILE.vdb in the environment, the cloud of
+# Walt Disney Animation Studios at a sixteenth of its size, detail_4k.jpg is made, too.
 # Usage: update_pictures.sh PROGRAM FOLDER [NAME ...]
 set -eu
 program=$(realpath "$1")
@@ -201,6 +201,44 @@ if picture lights; then
   show spot cloud.vdb --size 480x360 --sky 0.03,0.05,0.09 --spot 2.2,2.6,1.2,0,0.5,0,14,6,16 --shadow-multiplier spot=1,0.3,0.05
   show suns cloud.vdb --size 480x360 --sky 0.04,0.06,0.1 --sun key=100,20,3.4,2.2,1.2 --sun fill=-70,30,0.3,0.5,0.9
   padding="" tiles lights.png 3x1 lamp.png spot.png suns.png
+fi
+
+if picture outputs; then
+  grow cloud_300.vdb cloud $base --resolution 300 $usual --billow 0.7
+  "$program" transform sphere_uv.obj -o ball.obj --scale 0.35 --move 1.15,1.1,0.5 --quiet
+  view="--size 480x270 --camera-position 1.2,1.2,5.4 --look-at 0.15,0.72,0 --fov 40"
+  show object cloud_300.vdb $view --object ball.obj --object-color 0.8,0.5,0.2 --checker 16 --ground
+  show holdout cloud_300.vdb $view --holdout-object ball.obj
+  "$program" render cloud_300.vdb -o layers.exr $view --aov normal,Z_median --quiet
+  oiiotool layers.exr --ch N.X,N.Y,N.Z --mulc 0.5 --addc 0.5 -d uint8 -o normals.png
+  # Near is white, 6.6 away and farther black.
+  oiiotool layers.exr --ch Z_median,Z_median,Z_median --clamp:max=6.6 --mulc -0.5 --addc 3.3 --clamp:min=0:max=1 -d uint8 -o depth.png
+  padding=:pad=4 tiles outputs.png 2x2 object.png normals.png holdout.png depth.png
+fi
+
+if picture mesh_decimated; then
+  grow hare_surface_300.vdb cloud $hare --resolution 300 --layers 3 --billow 1 --surface hare_300.vdb
+  "$program" mesh hare_300.vdb -o hare_all.obj --preview hare_all.png --size 420x420 --quiet
+  for faces in 20000 2000; do
+    "$program" mesh hare_300.vdb -o hare_$faces.obj --faces $faces --preview hare_$faces.png --size 420x420 --quiet
+  done
+  grep -c '^f ' hare_all.obj
+  padding="" tiles mesh_decimated.png 3x1 hare_all.png hare_20000.png hare_2000.png
+fi
+
+if [ -n "${DISNEY:-}" ] && picture detail_4k; then
+  grow coarse.vdb cloud $base
+  grow detail.vdb cloud $base --resolution 512 --layers 5 --roughness 0.65 --billow 0.4 --amplitude "2.5%*noise:2x,2:0.6,1.5" --flat-base 3%,6% \
+    --edge-thickness "0.4%*noise:3x:0.6,4" --advect "1%*noise:2x:0,1*height:0=1.4,0.6=0.6,1=0.1" --advect-frequency 18x
+  files= crops=
+  for volume in coarse.vdb detail.vdb "$DISNEY"; do
+    name=$(basename "$volume" .vdb)
+    view="--view 25,0 --sun 100,35"
+    show "whole_$name" "$volume" $view --size 480x270
+    show "crop_$name" "$volume" $view --size 3840x2160 --crop 1100,620,1580,890
+    files="$files whole_$name.png" crops="$crops crop_$name.png"
+  done
+  padding=:pad=4 tiles detail_4k.jpg 3x2 $files $crops
 fi
 
 if picture volumes; then
