@@ -45,6 +45,8 @@ void useVolume(const Input& input);
 void usePicture(const Input& input);
 void useDeepPicture(const Input& input);
 void useCamera(const Input& input);
+/// What follows on a line "...", the end of YAML, is a table that the configuration may name.
+void useViewConfig(const Input& input);
 void useToml(const Input& input);
 void useFieldTexts(const Input& input);
 void useScript(const Input& input);

@@ -34,6 +34,7 @@ constexpr Format kFormats[] = {
     {"png", ".png", usePicture, mutatePng},
     {"chan", ".chan", useCamera},
     {"camera", ".json", useCamera},
+    {"ocio", ".ocio", useViewConfig},
     {"toml", ".toml", useToml},
     {"field", ".txt", useFieldTexts},
     {"felt", ".felt", useScript},

@@ -93,8 +93,8 @@ std::string& lastError() {
 bool runVerb(std::vector<std::string> arguments, std::string_view named) {
   using namespace nephele::apps;
   static const std::vector<Verb> verbs = {levelsetVerb(), cloudVerb(), advectVerb(),   wispsVerb(),
-                                          meshVerb(),     cutVerb(),   transferVerb(), renderVerb(),
-                                          infoVerb(),     feltVerb()};
+                                          meshVerb(),     cutVerb(),   transferVerb(), transformVerb(),
+                                          renderVerb(),   infoVerb(),  feltVerb()};
   arguments.insert(arguments.end(), {"--quiet", "--threads", "1", "--memory-limit", "256M"});
   std::vector<char*> argv = {const_cast<char*>("nephele")};
   for (std::string& argument : arguments) argv.push_back(argument.data());

@@ -39,7 +39,7 @@ void writeAndReadBack(const Mesh& mesh, std::uint64_t hash) {
 void runVerbs(const Input& input) {
   const std::string &path = input.path, volume = scratchPath("out.vdb"), mesh = scratchPath("out.obj");
   // Wraps take as long as their fineness asks for, however small the mesh; only `levelset` has coarse ones.
-  switch (input.hash / 3 % 10) {
+  switch (input.hash / 3 % 11) {
     case 0:
       runVerb({"levelset", path, "-o", volume, "--resolution", "8"}, path);
       break;
@@ -75,6 +75,12 @@ void runVerbs(const Input& input) {
       runVerb({"transfer", "--from", ballMesh(), "--to", path, "-o", mesh, "--resolution", "8",
                "--iterations", "1"},
               "");
+      break;
+    case 9:
+      runVerb(
+          {"transform", path, "-o", mesh, "--up-axis", "z", "--to-unit", input.hash % 2 == 0 ? "mm" : "ft",
+           "--scale", input.hash % 5 == 0 ? "1e9" : "0.5", "--rotate", "10,20,30", "--place", "ground"},
+          path);
       break;
     default:
       runVerb({"transfer", "--from", path, "--to", ballMesh(), "-o", mesh, "--method", "closest"}, "");

@@ -10,7 +10,7 @@ program=$1 folder=$2 seconds=$3
 shift 3
 mkdir -p "$folder/corpus" "$folder/findings" "$folder/logs"
 folder=$(cd "$folder" && pwd)
-[ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera toml field felt calls
+[ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera ocio toml field felt calls
 
 rm -rf "$folder/seeds"
 "$program" --write-seeds="$folder/seeds"

@@ -331,6 +331,98 @@ void writeScriptSeeds(const std::string& parent) {
              "scalarfield f = (mask(l) * l.x - n[1]) ^ 0.5 + n * h * n; bool b = 1.0 / 3 < 7 / 2;\n");
 }
 
+void writeViewConfigSeeds(const std::string& parent) {
+  const Folder ocio(parent, "ocio");
+  const std::string head = R"(ocio_profile_version: 2
+environment: {A: table}
+search_path: ""
+strictparsing: true
+roles: {default: lin_rec709, scene_linear: lin_rec709}
+file_rules:
+  - !<Rule> {name: Default, colorspace: default}
+)";
+  const std::string plain = head + R"(displays:
+  screen:
+    - !<View> {name: Half, colorspace: half}
+    - !<View> {name: Film, colorspace: film, looks: "+warm"}
+    - !<View> {name: Log, colorspace: log}
+active_displays: [screen]
+active_views: []
+looks:
+  - !<Look>
+    name: warm
+    process_space: log
+    transform: !<CDLTransform> {slope: [1.1, 1, 0.9], offset: [0, 0.01, 0], power: [1, 1.1, 1], sat: 0.9}
+colorspaces:
+  - !<ColorSpace>
+    name: lin_rec709
+  - !<ColorSpace>
+    name: half
+    from_scene_reference: !<MatrixTransform> {matrix: [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1]}
+  - !<ColorSpace>
+    name: log
+    from_scene_reference: !<LogAffineTransform> {base: 10, log_side_slope: 0.2, log_side_offset: 0.6, lin_side_offset: 0.01}
+  - !<ColorSpace>
+    name: film
+    from_scene_reference: !<GroupTransform>
+      children:
+        - !<ColorSpaceTransform> {src: lin_rec709, dst: log}
+        - !<FileTransform> {src: $A, interpolation: linear}
+        - !<RangeTransform> {min_in_value: 0, min_out_value: 0, max_in_value: 1, max_out_value: 1}
+        - !<ExponentTransform> {value: [0.5, 0.5, 0.5, 1]}
+)";
+  const std::string displays = head + R"(shared_views:
+  - !<View> {name: Half, view_transform: tone, display_colorspace: <USE_DISPLAY_NAME>}
+displays:
+  screen:
+    - !<Views> [Half]
+    - !<View> {name: Film, view_transform: tone, display_colorspace: screen, rule: any}
+    - !<View> {name: Log, colorspace: acescct}
+viewing_rules:
+  - !<Rule> {name: any, colorspaces: lin_rec709}
+default_view_transform: tone
+view_transforms:
+  - !<ViewTransform>
+    name: tone
+    from_scene_reference: !<GroupTransform>
+      children:
+        - !<GradingPrimaryTransform> {style: log, contrast: {rgb: [1, 1, 1], master: 1.2}}
+        - !<ColorSpaceTransform> {src: lin_rec709, dst: named}
+        - !<BuiltinTransform> {style: UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD}
+named_transforms:
+  - !<NamedTransform>
+    name: named
+    transform: !<ExposureContrastTransform> {style: linear, exposure: 0.5, contrast: 1.1, gamma: 1, pivot: 0.18}
+display_colorspaces:
+  - !<ColorSpace>
+    name: screen
+    from_display_reference: !<GroupTransform>
+      children:
+        - !<FileTransform> {src: table}
+        - !<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, direction: inverse}
+colorspaces:
+  - !<ColorSpace>
+    name: lin_rec709
+    aliases: [linear]
+  - !<ColorSpace>
+    name: acescct
+    to_scene_reference: !<BuiltinTransform> {style: ACEScct_to_ACES2065-1}
+)";
+  const std::pair<const char*, const char*> tables[] = {
+      {"cube", "LUT_3D_SIZE 2\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n"},
+      {"curve", "LUT_1D_SIZE 3\n0 0 0\n0.6 0.5 0.4\n1 1 1\n"},
+      {"spi1d", "Version 1\nFrom 0.0 1.0\nLength 3\nComponents 1\n{\n0\n0.7\n1\n}\n"},
+      {"spimtx", "0.9 0.1 0 0\n0 1 0 0\n0 0.1 0.9 0\n"},
+      {"clf",
+       "<?xml version=\"1.0\"?>\n<ProcessList compCLFversion=\"3\" id=\"a\">\n<LUT1D inBitDepth=\"32f\" "
+       "outBitDepth=\"32f\"><Array dim=\"3 1\">0 0.6 1</Array></LUT1D>\n</ProcessList>\n"},
+      {"csp", "CSPLUTV100\n1D\n\n2\n0 1\n0 1\n2\n0 1\n0 1\n2\n0 1\n0 1\n\n2\n0 0 0\n1 1 1\n"}};
+  for (const auto& [name, table] : tables) {
+    ocio.write(fmt::format("plain_{}.ocio", name), plain + "...\n" + table);
+    ocio.write(fmt::format("displays_{}.ocio", name), displays + "...\n" + table);
+  }
+}
+
 void writeTextSeeds(const std::string& parent) {
   const Folder chan(parent, "chan"), camera(parent, "camera"), toml(parent, "toml"), field(parent, "field"),
       calls(parent, "calls");
@@ -373,6 +465,7 @@ void writeSeeds(const std::string& folder) {
   writeVolumeSeeds(folder);
   writePictureSeeds(folder);
   writeScriptSeeds(folder);
+  writeViewConfigSeeds(folder);
   writeTextSeeds(folder);
 }
 

@@ -60,9 +60,9 @@ void sample(const auto& field) {
 
 const std::vector<apps::Verb>& verbs() {
   using namespace nephele::apps;
-  static const std::vector<Verb> all = {levelsetVerb(),  cloudVerb(), advectVerb(),   wispsVerb(),
-                                        meshVerb(),      cutVerb(),   transferVerb(), renderVerb(),
-                                        turntableVerb(), feltVerb()};
+  static const std::vector<Verb> all = {levelsetVerb(), cloudVerb(),     advectVerb(),   wispsVerb(),
+                                        meshVerb(),     cutVerb(),       transferVerb(), transformVerb(),
+                                        renderVerb(),   turntableVerb(), feltVerb()};
   return all;
 }
 

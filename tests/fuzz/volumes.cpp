@@ -63,7 +63,7 @@ void writeAndReadBack(const std::vector<VdbGrid>& grids) {
 void runVerbs(const Input& input) {
   const std::string &path = input.path, volume = scratchPath("out.vdb"), mesh = scratchPath("out.obj");
   const std::string picture = scratchPath("out.exr");
-  switch (input.hash % 10) {
+  switch (input.hash % 11) {
     case 0:
       runVerb({"mesh", path, "-o", mesh}, path);
       break;
@@ -101,6 +101,12 @@ void runVerbs(const Input& input) {
     case 8:
       runVerb({"render", ballFog(), "--object", path, "-o", picture, "--size", "4x3", "--samples", "1",
                "--octaves", "1", "--aov", "none"},
+              path);
+      break;
+    case 9:
+      runVerb({"transform", path, "-o", volume, "--to-up-axis", "z", "--unit",
+               input.hash / 11 % 2 == 0 ? "mm" : "ft", "--scale", input.hash / 11 % 5 == 0 ? "1e9" : "0.5",
+               "--rotate", "10,20,30", "--place", "centre"},
               path);
       break;
     default:
