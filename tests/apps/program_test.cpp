@@ -40,8 +40,8 @@ int optionsShown(const std::string& help) {
 }
 
 TEST(Program, HelpShowsTheOptionsOfAFirstDayAndLeadsToAll) {
-  for (const std::string verb :
-       {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render", "turntable", "info", "felt"}) {
+  for (const std::string verb : {"levelset", "cloud", "advect", "wisps", "mesh", "cut", "transfer", "render",
+                                 "turntable", "info", "felt"}) {
     const ProgramResult help = runProgram(verb + " --help"), all = runProgram(verb + " --help-all");
     EXPECT_EQ(help.exitCode, 0) << verb;
     // Fifteen or so, three of help, and --frames and --wedge.
