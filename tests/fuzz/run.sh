@@ -35,7 +35,7 @@ done
 inputs_of() {
   case $1 in
     deep) echo 150 ;;
-    exr | nvdb | obj) echo 300 ;;
+    exr | nvdb | obj | ocio) echo 300 ;;
     hdr) echo 400 ;;
     ply | stl | png) echo 600 ;;
     chan | gltf | off | vdb) echo 1000 ;;

@@ -116,6 +116,10 @@ TEST_F(ConfigViews, OfBrokenConfigurationsAreRefusedByName) {
     EXPECT_TRUE(refused.starts_with(folder_.file(name) + ": ")) << refused;
     EXPECT_EQ(refused.find('\n'), std::string::npos) << refused;
   }
+  std::ofstream(folder_.file("version.ocio")) << "ocio_profile_version: two\n";
+  EXPECT_EQ(refusal(folder_.file("version.ocio"), ""),
+            folder_.file("version.ocio") +
+                ": cannot be used as an OpenColorIO configuration: ocio_profile_version is no number");
   const std::string table = refusal(config_, "Broken");
   EXPECT_TRUE(table.starts_with(config_ + ": ")) << table;
   EXPECT_NE(table.find("no_such_table.spi1d"), std::string::npos) << table;
