@@ -274,6 +274,22 @@ bool Checker::alwaysReturns(const Statement& statement) {
   }
 }
 
+void Checker::warnOfIntegers(const Expression& call) {
+  if (call.name != "operator/" || call.parts.size() != 2) return;
+  const Expression &a = *call.parts[0], &b = *call.parts[1];
+  if (a.kind != ExpressionKind::literal || b.kind != ExpressionKind::literal ||
+      !a.literal.is<std::int64_t>() || !b.literal.is<std::int64_t>())
+    return;
+  const std::int64_t above = a.literal.as<std::int64_t>(), below = b.literal.as<std::int64_t>();
+  if (below == 0 || above % below == 0) return;
+  diagnostics_->push_back(
+      {Code::divisionOfIntegers, call.span,
+       std::to_string(above) + "/" + std::to_string(below) + " of integers is " +
+           std::to_string(above / below),
+       "write " + std::to_string(above) + ".0/" + std::to_string(below) + " for a fraction",
+       Severity::warning});
+}
+
 void Checker::parameter(ParameterDeclaration& parameter) {
   DeclaredName& declared = parameter.declared;
   const Type type = declared.type;

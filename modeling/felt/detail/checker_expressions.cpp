@@ -325,22 +325,6 @@ void Checker::noSuchCall(const Expression& call, const std::vector<Candidate>& c
   fault(Code::noSuchCall, call.span, "no '" + call.name + "' takes " + typesOf(call), hint);
 }
 
-void Checker::warnOfIntegers(const Expression& call) {
-  if (call.name != "operator/" || call.parts.size() != 2) return;
-  const Expression &a = *call.parts[0], &b = *call.parts[1];
-  if (a.kind != ExpressionKind::literal || b.kind != ExpressionKind::literal ||
-      !a.literal.is<std::int64_t>() || !b.literal.is<std::int64_t>())
-    return;
-  const std::int64_t above = a.literal.as<std::int64_t>(), below = b.literal.as<std::int64_t>();
-  if (below == 0 || above % below == 0) return;
-  diagnostics_->push_back(
-      {Code::divisionOfIntegers, call.span,
-       std::to_string(above) + "/" + std::to_string(below) + " of integers is " +
-           std::to_string(above / below),
-       "write " + std::to_string(above) + ".0/" + std::to_string(below) + " for a fraction",
-       Severity::warning});
-}
-
 bool Checker::index(ExpressionPtr& expression) {
   const bool both = this->expression(expression->parts[0]) & this->expression(expression->parts[1]);
   if (!both || !convert(expression->parts[1], {Kind::integer}, "an index")) return false;
