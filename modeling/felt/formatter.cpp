@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "nephele/modeling/felt/detail/parser.h"
 #include "nephele/modeling/felt/detail/token.h"
 #include "nephele/modeling/felt/program.h"
 
@@ -161,8 +162,10 @@ std::string formattedScript(const std::string& name, const std::string& text) {
   Sources sources;
   std::vector<Diagnostic> diagnostics;
   const int file = sources.add(name, text);
-  const Tokens tokens = tokensOf(sources, file, diagnostics);
+  // Lines and levels follow from brackets, which only a script that can be read has in order.
+  parse(sources, file, diagnostics);
   if (!diagnostics.empty()) throw ScriptError(std::move(diagnostics), sources);
+  const Tokens tokens = tokensOf(sources, file, diagnostics);
   return Formatter(sources, tokens).run();
 }
 

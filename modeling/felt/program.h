@@ -131,7 +131,7 @@ class Session {
 
 /// The script with two spaces per level, one statement per line and one space around operators, as this
 /// project writes them; comments and empty lines stay. Formatting again changes nothing.
-/// @throws ScriptError where brackets or strings do not close.
+/// @throws ScriptError with the faults of a script that cannot be parsed.
 std::string formattedScript(const std::string& name, const std::string& text);
 
 }  // namespace nephele::felt

@@ -33,6 +33,7 @@ TEST(FeltFormatter, KeepsCommentsEmptyLinesAndLineBreaksInStatements) {
 TEST(FeltFormatter, RefusesWhatHasNoEnd) {
   EXPECT_THROW(formattedScript("s.felt", "print(\"abc"), ScriptError);
   EXPECT_THROW(formattedScript("s.felt", "/* abc"), ScriptError);
+  EXPECT_THROW(formattedScript("s.felt", "for (int i = 0; i < 3; i++) { print((1, 2, 3);"), ScriptError);
   EXPECT_EQ(formattedScript("s.felt", ""), "");
 }
 
