@@ -139,7 +139,11 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
   line.arguments = withSettings(typed);
   const bool hasSheet = !command.hasOwnFrames() && givenTo("--contact-sheet", line.arguments);
   if (!command.hasOwnFrames() && givenTo("--frames", line.arguments)) {
-    if (line.wedge) throw CLI::ValidationError("--wedge", "is for one frame; leave out --frames");
+    if (line.wedge)
+      throw CLI::ValidationError(
+          "--wedge",
+          "is for one frame; leave out --frames, or call once for each value, with the "
+          "value in place of --wedge");
     if (hasSheet) line.arguments = withPreview(line.arguments, command.app);
     line.sequence = Sequence::of(line.arguments);
     line.calls = {line.sequence->size(),

@@ -66,6 +66,12 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
+  for (const std::string& input : options.scene.inputs)
+    if (FramePattern::places(input) != 0 && !std::filesystem::exists(input))
+      throw CLI::ValidationError(
+          "input", fmt::format("got '{}', a volume for each frame, but turntable turns around one; make the "
+                               "frames by render --frames, and turn by a --camera FILE that moves",
+                               input));
   digest = optionsDigest(*options.app, kNotOfPictures, fmt::format("{}-{}", first, last));
   const auto output = patternOf("--output", options.output),
              preview = patternOf("--preview", options.preview);

@@ -170,7 +170,7 @@ TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
   // Also a value that only the last call would have.
   refuses(cloud("--wedge seed=1,2,x"), "--seed: got 'x'");
   refuses(cloud("--wedge half=true,yes"), "it is a flag");
-  refuses(cloud("--wedge seed=1,2 --frames 1-3"), "leave out --frames");
+  refuses(cloud("--wedge seed=1,2 --frames 1-3"), "call once for each value");
   refuses(fmt::format("render '{}' --deep '{}' --wedge fov=20,30 --contact-sheet '{}'", file("ball.vdb"),
                       file("d.exr"), file("t.png")),
           "shows previews, volumes and meshes");
