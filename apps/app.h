@@ -44,6 +44,8 @@ class Run : public Progress {
   };
   std::optional<Part> part;
 
+  /// The frame, in a sequence.
+  std::optional<int> frame() const { return part ? part->frame : std::nullopt; }
   /// The longest side of `own`, the box of the input; in a sequence that of its largest frame.
   double longestSide(const Box& own) const;
   /// `own`; in a sequence the box around all inputs.

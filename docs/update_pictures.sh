@@ -408,3 +408,9 @@ if picture fireball; then
   oiiotool fireball.png --quality 90 -o fireball.jpg
   keep fireball.jpg
 fi
+
+if picture hot_and_cold; then
+  "$program" render felt/hot_and_cold.felt --preview hot_and_cold.png --size 640x640 --view 20,3 --set cells=120 --set steps=75 --quiet
+  oiiotool hot_and_cold.png --quality 90 -o hot_and_cold.jpg
+  keep hot_and_cold.jpg
+fi

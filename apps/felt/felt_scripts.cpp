@@ -7,8 +7,6 @@
 #include <sstream>
 
 #include "apps/felt/explain.h"
-#include "apps/options/expression_names.h"
-#include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/text_file.h"
 
@@ -33,16 +31,28 @@ void tell(const felt::ScriptError& error, bool asJson) {
     say(error.what());
 }
 
-felt::Program checked(const ScriptText& script) {
-  return felt::Program(script.name, script.text, feltFunctions(), namesOfPlace(0, 0).given);
+felt::Program checked(const ScriptText& script, const Run& run) {
+  return felt::Program(script.name, script.text, feltFunctions(),
+                       namesOfPlace(double(run.frame().value_or(0)), 0).given);
 }
 
-/// --set as the names and expressions that they hold. @throws CLI::ValidationError
-std::map<std::string, std::string> settingsOf(const FeltArguments& arguments, const felt::Program& program) {
+void describe(const felt::Named& named, Run& run) {
+  nlohmann::json entry{{"name", named.name}, {"type", typeName(named.type)}};
+  if (!named.type.isField())
+    entry["value"] = shown(named.value, named.type);
+  else if (named.operations > 0)
+    entry["operations"] = named.operations;
+  run.stats["variables"].push_back(std::move(entry));
+}
+
+}  // namespace
+
+std::map<std::string, std::string> settingsOf(const std::vector<std::string>& texts,
+                                              const felt::Program& program) {
   std::vector<std::string> names;
   for (const felt::ScriptParameter& parameter : program.parameters()) names.push_back(parameter.name);
   std::map<std::string, std::string> settings;
-  for (const std::string& text : arguments.settings) {
+  for (const std::string& text : texts) {
     const std::size_t equals = text.find('=');
     if (equals == std::string::npos || equals == 0) refuseValue("--set", text, "NAME=VALUE");
     const std::string name = text.substr(0, equals);
@@ -57,27 +67,6 @@ std::map<std::string, std::string> settingsOf(const FeltArguments& arguments, co
     settings[name] = text.substr(equals + 1);
   }
   return settings;
-}
-
-void describe(const felt::Named& named, Run& run) {
-  nlohmann::json entry{{"name", named.name}, {"type", typeName(named.type)}};
-  if (!named.type.isField())
-    entry["value"] = shown(named.value, named.type);
-  else if (named.operations > 0)
-    entry["operations"] = named.operations;
-  run.stats["variables"].push_back(std::move(entry));
-}
-
-}  // namespace
-
-const felt::Registry& feltFunctions() {
-  static const felt::Registry& functions = []() -> const felt::Registry& {
-    static felt::Registry registry;
-    felt::addModelingFunctions(registry);
-    felt::addLevelsetFunctions(registry);
-    return registry;
-  }();
-  return functions;
 }
 
 ScriptText readScript(const std::string& path) {
@@ -99,9 +88,9 @@ felt::Context feltContext(const felt::Limits& limits, const Run& run) {
 
 void runScript(const FeltArguments& arguments, Run& run) {
   try {
-    const felt::Program program = checked(readScript(arguments.script()));
+    const felt::Program program = checked(readScript(arguments.script()), run);
     tellWarnings(program, arguments.json);
-    const felt::RunOptions options{.settings = settingsOf(arguments, program),
+    const felt::RunOptions options{.settings = settingsOf(arguments.settings, program),
                                    .countsOperations = arguments.explain};
     felt::Context context = feltContext(arguments.limits(), run);
     run.begin("run");
@@ -122,7 +111,7 @@ void checkScripts(const FeltArguments& arguments, Run& run) {
   for (const std::string& path : arguments.words) {
     run.begin("check");
     try {
-      tellWarnings(checked(readScript(path)), arguments.json);
+      tellWarnings(checked(readScript(path), run), arguments.json);
     } catch (const felt::ScriptError& error) {
       tell(error, arguments.json);
       isGood = false;

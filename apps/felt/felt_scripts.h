@@ -1,15 +1,15 @@
 #pragma once
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "apps/app.h"
+#include "apps/options/expression_names.h"
 #include "apps/options/felt_options.h"
 #include "nephele/modeling/felt/program.h"
 
 namespace nephele::apps {
-
-/// All functions that scripts may call.
-const felt::Registry& feltFunctions();
 
 /// A script and what it is called in messages.
 struct ScriptText {
@@ -17,6 +17,11 @@ struct ScriptText {
 };
 /// The script at `path`; "-" is the standard input. @throws Error naming the path.
 ScriptText readScript(const std::string& path);
+
+/// Values of --set, NAME=VALUE each, as names and expressions. @throws CLI::ValidationError if one is not of
+/// that form, or the program has no such parameter.
+std::map<std::string, std::string> settingsOf(const std::vector<std::string>& texts,
+                                              const felt::Program& program);
 
 /// What a script runs in: what it prints are results of `run`.
 felt::Context feltContext(const felt::Limits& limits, const Run& run);

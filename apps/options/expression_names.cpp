@@ -21,21 +21,32 @@ bool isSpheres(const std::string& how) {
   return how == "spheres";
 }
 
+std::unique_ptr<felt::Registry> allFunctions() {
+  auto registry = std::make_unique<felt::Registry>();
+  felt::addModelingFunctions(*registry);
+  felt::addLevelsetFunctions(*registry);
+  return registry;
+}
+
 }  // namespace
 
+const felt::Registry& feltFunctions() {
+  static const std::unique_ptr<const felt::Registry> functions = allFunctions();
+  return *functions;
+}
+
 ExpressionNames namesOfPlace(double time, int seed) {
-  ExpressionNames names{std::make_unique<felt::Registry>(),
-                        {{"P", {felt::Kind::vectorField}, identity()},
-                         {"time", {felt::Kind::number}, time},
-                         {"seed", {felt::Kind::integer}, std::int64_t(seed)}}};
-  felt::addModelingFunctions(*names.registry);
-  felt::addLevelsetFunctions(*names.registry);
-  return names;
+  // Nobody owns what stays until the end of the program.
+  return {std::shared_ptr<const felt::Registry>(std::shared_ptr<void>(), &feltFunctions()),
+          {{"P", {felt::Kind::vectorField}, identity()},
+           {"time", {felt::Kind::number}, time},
+           {"seed", {felt::Kind::integer}, std::int64_t(seed)}}};
 }
 
 ExpressionNames namesOfShape(const ShapeLookUps& lookUps) {
   ExpressionNames names = namesOfPlace(lookUps.time, lookUps.seed);
-  felt::Registry& r = *names.registry;
+  std::shared_ptr<felt::Registry> own = allFunctions();
+  felt::Registry& r = *own;
   r.group("the shape");
   r.add("scalarfield along(vector direction, bool clamped = true)",
         "0 where the shape begins in this direction, 1 where it ends, and so beyond, unless it is not "
@@ -67,6 +78,7 @@ ExpressionNames namesOfShape(const ShapeLookUps& lookUps) {
   const auto height = [along = lookUps.along] { return felt::Value(clamp(along({0, 1, 0}), 0, 1)); };
   names.given.push_back({"height", {felt::Kind::scalarField}, {}, height});
   names.given.push_back({"normal", {felt::Kind::vectorField}, {}, normal});
+  names.registry = std::move(own);
   return names;
 }
 

@@ -23,9 +23,12 @@ struct ShapeLookUps {
   int seed = 0;
 };
 
+/// All functions that scripts may call.
+const felt::Registry& feltFunctions();
+
 /// What an expression may use: functions, and names with their values.
 struct ExpressionNames {
-  std::unique_ptr<felt::Registry> registry;
+  std::shared_ptr<const felt::Registry> registry;
   std::vector<felt::Given> given;
 };
 

@@ -43,10 +43,6 @@ std::string cornersOf(const Box& box) {
                      box.max.y, box.max.z);
 }
 
-double frameOf(const Run& run) {
-  return run.part && run.part->frame ? double(*run.part->frame) : 0.0;
-}
-
 /// The values of an attribute, wherever they are.
 ScalarField attributeRange(const Mesh& mesh, const std::string& name) {
   Interval range{0, 0};
@@ -96,7 +92,7 @@ FieldSources::FieldSources(const Mesh& shape, const Options& options, const Run&
            .mask = [this](const std::string& path, const std::string& grid) { return mask(path, grid); },
            .attribute = [this](const std::string& name,
                                bool hasSpheres) { return attribute(name, hasSpheres); },
-           .time = frameOf(run),
+           .time = double(run.frame().value_or(0)),
            .seed = options.seed})) {}
 
 ScalarField FieldSources::field(const FieldValue& value) {
@@ -125,7 +121,7 @@ double FieldSources::bound(const FieldValue& value, const Mesh& mesh, int seed, 
                     .facing = [&](const Vec3f&) { return share(-1); },
                     .mask = [&](const std::string&, const std::string&) { return share(0); },
                     .attribute = [&](const std::string& name, bool) { return attributeRange(mesh, name); },
-                    .time = frameOf(run),
+                    .time = double(run.frame().value_or(0)),
                     .seed = seed});
   const Interval range = madeOf(value, names, longestSide).range(box.expanded(float(longestSide) / 2));
   requireAllowed(value, range);

@@ -28,10 +28,11 @@ class Loader {
   Loader(Sources& sources, std::vector<Diagnostic>& diagnostics)
       : sources_(sources), diagnostics_(diagnostics) {}
 
-  std::vector<StatementPtr> load(const std::string& name, std::string text) {
-    seen_.insert(canonical(name));
+  /// The statements of a file of the sources, with those of what it imports.
+  std::vector<StatementPtr> load(int file) {
+    seen_.insert(canonical(sources_[file].name()));
     std::vector<StatementPtr> statements;
-    append(sources_.add(name, std::move(text)), statements);
+    append(file, statements);
     return statements;
   }
 
@@ -146,7 +147,7 @@ Program::Program(const std::string& name, std::string text, const Registry& regi
   parts_->given = given;
   for (const Given& one : given) parts_->checker.declare(one.name, one.type);
   std::vector<Diagnostic> diagnostics;
-  parts_->statements = Loader(parts_->sources, diagnostics).load(name, std::move(text));
+  parts_->statements = Loader(parts_->sources, diagnostics).load(parts_->sources.add(name, std::move(text)));
   parts_->checker.check(parts_->statements, diagnostics);
   if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), parts_->sources);
   parts_->warnings = std::move(diagnostics);
@@ -281,33 +282,30 @@ Value ExpressionText::evaluate(Context& context, const std::vector<Given>& given
 }
 
 struct Session::Parts {
-  Parts(const Registry& registry, Context& context_)
-      : checker(registry), interpreter(checker, context_), context(context_) {}
+  Parts(const Registry& registry, Context& context) : checker(registry), interpreter(checker, context) {}
 
   Sources sources;
   Checker checker;
   Interpreter interpreter;
-  Context& context;
   /// What was entered stays: functions point into it.
   std::vector<std::vector<StatementPtr>> entered;
-  int count = 0;
 };
 
 Session::Session(const Registry& registry, Context& context, const std::vector<Given>& given)
     : parts_(std::make_unique<Parts>(registry, context)) {
   for (const Given& one : given) {
     parts_->checker.declare(one.name, one.type);
-    parts_->interpreter.globals().push_back(one.value);
+    parts_->interpreter.globals().push_back(one.make ? one.make() : one.value);
   }
 }
 
 Session::~Session() = default;
 
 Named Session::enter(const std::string& text) {
-  const std::string name = "line " + std::to_string(++parts_->count);
-  std::vector<Diagnostic> ofExpression;
   Sources& sources = parts_->sources;
-  const int file = sources.add(name, text);
+  const int file = sources.add("line " + std::to_string(sources.count() + 1), text);
+  // A text is an expression if it can be read as one; else what is wrong with it as statements is told.
+  std::vector<Diagnostic> ofExpression;
   if (ExpressionPtr expression = parseExpression(sources, file, ofExpression)) {
     std::vector<Diagnostic> diagnostics;
     parts_->checker.checkExpression(expression, {}, diagnostics);
@@ -318,8 +316,7 @@ Named Session::enter(const std::string& text) {
     });
   }
   std::vector<Diagnostic> diagnostics;
-  Sources own;
-  std::vector<StatementPtr> statements = Loader(sources, diagnostics).load(name, text);
+  std::vector<StatementPtr> statements = Loader(sources, diagnostics).load(file);
   if (!hasErrors(diagnostics)) parts_->checker.check(statements, diagnostics, true);
   if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), sources);
   parts_->entered.push_back(std::move(statements));

@@ -136,7 +136,7 @@ TEST(Scripts, AreLookedAt) {
   EXPECT_GT(sum("A"), 100);
 
   EXPECT_EQ(runProgram(command + " --set radius=4").exitCode, 2);
-  EXPECT_EQ(runProgram(command + " --set radios=1").exitCode, 1);
+  EXPECT_EQ(runProgram(command + " --set radios=1").exitCode, 2);
   EXPECT_EQ(runProgram(command + " --detail exact").exitCode, 1) << "colours need a grid";
   EXPECT_EQ(runProgram("render " + script + " " + script + " -o " + picture).exitCode, 1);
 }

@@ -99,20 +99,12 @@ void script(benchmark::State& state, std::string text) {
   state.SetItemsProcessed(state.iterations() * state.range(0));
   state.counters["peak_MB"] = double(peakMemory()) / 1e6;
 }
-BENCHMARK_CAPTURE(script, hot_and_cold, kHotAndCold)
-    ->Arg(50)
-    ->Arg(100)
-    ->Arg(200)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime()
-    ->Iterations(1);
-BENCHMARK_CAPTURE(script, selma, kSelma)
-    ->Arg(50)
-    ->Arg(100)
-    ->Arg(200)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime()
-    ->Iterations(1);
+void inSteps(benchmark::internal::Benchmark* benchmark) {
+  for (const int steps : {50, 100, 200}) benchmark->Arg(steps);
+  benchmark->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
+}
+BENCHMARK_CAPTURE(script, hot_and_cold, kHotAndCold)->Apply(inSteps);
+BENCHMARK_CAPTURE(script, selma, kSelma)->Apply(inSteps);
 
 }  // namespace
 }  // namespace nephele

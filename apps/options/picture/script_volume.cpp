@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "apps/options/expression_names.h"
+#include "apps/felt/felt_scripts.h"
 #include "nephele/levelset/felt/field_extent.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/felt/program.h"
@@ -64,29 +64,19 @@ class Declared {
   std::vector<felt::Named> names_;
 };
 
-std::map<std::string, std::string> settingsOf(const ScriptOptions& options) {
-  std::map<std::string, std::string> settings;
-  for (const std::string& text : options.settings) {
-    const std::size_t at = text.find('=');
-    settings[text.substr(0, at)] = text.substr(at + 1);
-  }
-  return settings;
-}
-
 ScriptScene runScript(const std::string& path, const ScriptOptions& options, const PictureOptions& picture,
                       Run& run) {
   run.begin("script");
-  const double frame =
-      run.part && run.part->frame ? double(*run.part->frame) : picture.frameNumber.value_or(0);
+  const double frame = run.frame() ? double(*run.frame()) : picture.frameNumber.value_or(0);
   const ExpressionNames names = namesOfPlace(frame, picture.seed);
-  const felt::Program program = felt::Program::fromFile(path, *names.registry, names.given);
+  const felt::Program program = felt::Program::fromFile(path, feltFunctions(), names.given);
   for (const felt::Diagnostic& warning : program.warnings())
     run.note(felt::formatted(warning, program.sources()));
   felt::Context context;
   context.print = [&run](const std::string& line) { run.note(line); };
   context.progress = &run;
   context.limits.memoryBytes = run.memoryLimitBytes;
-  const Declared declared(path, program.run(context, {.settings = settingsOf(options)}));
+  const Declared declared(path, program.run(context, {.settings = settingsOf(options.settings, program)}));
 
   ScriptScene scene;
   const auto density = declared.as<ScalarField>("density", felt::Kind::scalarField);
@@ -159,11 +149,7 @@ void addScriptOptions(CLI::App& app, ScriptOptions& options) {
   app.add_option("--set", options.settings, "A parameter of the script; may be given again.")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->each([](const std::string& text) {
-        if (text.find('=') == std::string::npos || text.starts_with('='))
-          refuseValue("--set", text, "NAME=VALUE, as in gain=2");
-      });
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 bool isScript(const std::vector<std::string>& paths) {

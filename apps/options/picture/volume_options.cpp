@@ -70,9 +70,8 @@ VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& densi
   constexpr float kAcross = 192;
   const Box box = density.worldBox();
   const float side = box.longestSide(), voxel = std::max(side / kAcross, density.voxelSize());
-  const double frame = run.part && run.part->frame ? double(*run.part->frame) : 0.0;
   const VectorField color = evaluated("--color", expression, {felt::Kind::vectorField},
-                                      namesOfPlace(frame, 0), run.longestSide(box))
+                                      namesOfPlace(double(run.frame().value_or(0)), 0), run.longestSide(box))
                                 .as<VectorField>();
   VolumePart::Grids grids;
   for (std::size_t c = 0; c < 3; ++c)

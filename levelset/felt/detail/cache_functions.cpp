@@ -43,21 +43,6 @@ void addOfKind(Registry& r, const std::string& kind, const std::string& field) {
 
 }  // namespace
 
-int countWithin(const char* parameter, std::int64_t value, int lowest, int highest) {
-  if (value < lowest || value > highest)
-    throw CallError(Code::outOfRange, std::string(parameter) + " is " + std::to_string(value) +
-                                          ", and may be from " + std::to_string(lowest) + " to " +
-                                          std::to_string(highest));
-  return static_cast<int>(value);
-}
-
-float positive(const char* parameter, double value) {
-  const float result = static_cast<float>(value);
-  if (!(result > 0 && std::isfinite(result)))
-    throw CallError(Code::outOfRange, std::string(parameter) + " must be positive and finite");
-  return result;
-}
-
 void addCacheFunctions(Registry& r) {
   r.group("caches");
   addOfKind<float>(r, "scalar", "sphere((0,0,0), 1)");

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <string>
-
-#include "nephele/modeling/felt/diagnostic.h"
+#include "nephele/modeling/felt/argument.h"
 #include "nephele/modeling/felt/registry.h"
 
 /// The built-in functions of levelset, by the headings of the reference.
@@ -12,11 +10,6 @@ void addCacheFunctions(Registry& registry);
 void addMeshFunctions(Registry& registry);
 void addFileFunctions(Registry& registry);
 void addGriddedCloudFunctions(Registry& registry);
-
-/// `value` as an int. @throws CallError naming the parameter unless lowest <= value <= highest.
-int countWithin(const char* parameter, std::int64_t value, int lowest, int highest);
-/// `value` as single precision. @throws CallError naming the parameter unless it is positive and finite.
-float positive(const char* parameter, double value);
 
 /// The closed mesh of triangles that a shape stands for, repaired as far as that goes; what was done is told
 /// as notes. @throws Error as `repairMesh`; Cancelled.

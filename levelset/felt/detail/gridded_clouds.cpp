@@ -53,7 +53,7 @@ void addGriddedCloudFunctions(Registry& r) {
          const S& frequency, const S& lacunarity, const S& roughness, const S& billow, const S& billowScale,
          const std::string& noise, std::int64_t seed) {
         CumuloFractal fractal;
-        fractal.layers = countWithin("layers", layers, 1, kMaxCumuloLayers);
+        fractal.layers = inRange("layers", layers, 1, kMaxCumuloLayers);
         fractal.noise.kind = noiseKindOf(noise);
         fractal.amplitude = amplitude;
         fractal.frequency = frequency;
@@ -61,7 +61,7 @@ void addGriddedCloudFunctions(Registry& r) {
         fractal.roughness = roughness;
         fractal.billow = billow;
         fractal.billowScale = billowScale;
-        fractal.seed = static_cast<std::uint32_t>(countWithin("seed", seed, 0, 2147483647));
+        fractal.seed = static_cast<std::uint32_t>(inRange("seed", seed, 0, 2147483647));
         return grown(context, *s, positive("voxel", voxel), fractal);
       });
   r.add(
@@ -73,7 +73,7 @@ void addGriddedCloudFunctions(Registry& r) {
       "0.1));",
       [](Context& context, const S& object, const S& reference, const Domain& box, std::int64_t iterations) {
         NacelleOptions options;
-        options.steps = countWithin("iterations", iterations, 1, 20);
+        options.steps = inRange("iterations", iterations, 1, 20);
         options.order = 2;
         options.voxel = static_cast<float>(std::min({box.cell.x, box.cell.y, box.cell.z}));
         options.bake = [&](const S& field) { return sampled(field, box, context); };

@@ -122,7 +122,7 @@ ShapePtr surfaceWithin(const Context& context, const S& level, const Domain& dom
 }
 
 ShapePtr surface(const Context& context, const S& level, std::int64_t resolution) {
-  const int voxels = countWithin("resolution", resolution, kFewestVoxels, kMostVoxels);
+  const int voxels = inRange("resolution", resolution, kFewestVoxels, kMostVoxels);
   const Box box = extentOf(level, *context.progress);
   const float voxel = box.longestSide() / float(voxels);
   const auto grid =
@@ -154,7 +154,7 @@ S distanceTo(const Context& context, const Shape& shape, double voxelSize, const
 
 std::vector<Value> cut(const Context& context, const Shape& shape, const Array& knives,
                        std::int64_t resolution, double kerf) {
-  const int voxels = countWithin("resolution", resolution, kFewestVoxels, kMostVoxels);
+  const int voxels = inRange("resolution", resolution, kFewestVoxels, kMostVoxels);
   const Mesh solid = solidOf(shape, context);
   Knives blades;
   for (const Value& knife : *knives) blades.fields.emplace_back(knife.as<S>());
@@ -204,7 +204,7 @@ void addSurfaces(Registry& r) {
         "it the distance to its box. Shapes that are not closed are repaired.",
         "scalarfield level = shape2ls(ls2shape(sphere((0,0,0), 1), 32), 32);",
         [](Context& context, const ShapePtr& s, std::int64_t resolution) {
-          const int voxels = countWithin("resolution", resolution, kFewestVoxels + 1, kMostVoxels);
+          const int voxels = inRange("resolution", resolution, kFewestVoxels + 1, kMostVoxels);
           const Mesh solid = solidOf(*s, context);
           return distanceTo(context, *s, double(boundingBox(solid).longestSide()) / voxels, solid);
         });

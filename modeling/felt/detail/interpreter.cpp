@@ -253,10 +253,8 @@ Value Interpreter::evaluate(const Expression& expression) {
       for (const ExpressionPtr& part : expression.parts) elements->push_back(evaluate(*part));
       return Array(std::move(elements));
     }
-    case ExpressionKind::conversion: {
-      Value value = converted(evaluate(*expression.parts[0]), expression.type);
-      return value;
-    }
+    case ExpressionKind::conversion:
+      return converted(evaluate(*expression.parts[0]), expression.type);
     case ExpressionKind::member:
     case ExpressionKind::triple:
       break;

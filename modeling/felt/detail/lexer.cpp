@@ -16,10 +16,9 @@ constexpr std::array<std::string_view, 13> kKeywords{"func",   "for",   "while",
                                                      "true",   "false", "in"};
 
 /// Longest first, so that the first that fits is the right one.
-constexpr std::array<std::string_view, 38> kMarks{
-    "...", "++", "--", "+=", "-=", "*=", "/=", "^=", "==", "!=", "<=", ">=", "&&",
-    "||",  "+",  "-",  "*",  "/",  "^",  "%",  "<",  ">",  "=",  "!",  "(",  ")",
-    "[",   "]",  "{",  "}",  ",",  ";",  ".",  "?",  ":",  "&",  "|",  "#"};
+constexpr std::array<std::string_view, 34> kMarks{
+    "++", "--", "+=", "-=", "*=", "/=", "^=", "==", "!=", "<=", ">=", "&&", "||", "+", "-", "*", "/",
+    "^",  "%",  "<",  ">",  "=",  "!",  "(",  ")",  "[",  "]",  "{",  "}",  ",",  ";", ".", "?", ":"};
 
 bool isLetter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
@@ -91,8 +90,7 @@ class Lexer {
     if (isDigit(c) || (c == '.' && isDigit(at(place_ + 1)))) return readNumber();
     if (c == '"') return readString();
     for (const std::string_view mark : kMarks)
-      if (text_.substr(place_, mark.size()) == mark && mark != "..." && mark != "&" && mark != "|" &&
-          mark != "#") {
+      if (text_.substr(place_, mark.size()) == mark) {
         const int begin = place_;
         place_ += static_cast<int>(mark.size());
         result_.tokens.push_back({TokenKind::mark, since(begin), std::string(mark)});

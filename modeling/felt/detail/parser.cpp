@@ -61,6 +61,8 @@ class Parser : public ExpressionParser {
   StatementPtr stepped(const Span& begin, ExpressionPtr target, const Token& mark);
   StatementPtr assigned(const Span& begin, ExpressionPtr target, ExpressionPtr value);
   Type type(bool mayBeNothing);
+  /// A name, with the brackets of an array behind it as C has them.
+  DeclaredName declaredName(const Type& type, const std::string& what);
   StatementPtr declaration(const Span& begin);
   /// Name, parameters in brackets.
   void header(FunctionDeclaration& function, bool* isOpen);
@@ -296,30 +298,32 @@ Type Parser::type(bool mayBeNothing) {
   return result;
 }
 
+DeclaredName Parser::declaredName(const Type& type, const std::string& what) {
+  const Token token = expectName(what);
+  DeclaredName name{type, token.text, token.span};
+  if (accept("[")) {
+    expect("]", "after '['");
+    name.type.isArray = true;
+  }
+  return name;
+}
+
 StatementPtr Parser::declaration(const Span& begin) {
   StatementPtr result = made(StatementKind::declaration, begin);
   const Span typeSpan = here().span;
   const Type declared = type(false);
   do {
-    DeclaredName name;
-    name.type = declared;
-    const Token token = expectName("a name for the variable");
-    name.name = token.text;
-    name.nameSpan = token.span;
-    if (accept("[")) {
-      expect("]", "after '['");
-      name.type.isArray = true;
-    }
+    DeclaredName name = declaredName(declared, "a name for the variable");
     if (accept("=")) {
       name.value = expression();
     } else if (here().is("(")) {
       auto call = std::make_unique<Expression>();
       call->kind = ExpressionKind::call;
-      call->span = token.span;
+      call->span = name.nameSpan;
       call->name = typeName(declared);
       call->nameSpan = typeSpan;
       arguments(*call);
-      call->span = since(token.span);
+      call->span = since(name.nameSpan);
       name.value = std::move(call);
     }
     result->names.push_back(std::move(name));
@@ -351,15 +355,8 @@ void Parser::header(FunctionDeclaration& function, bool* isOpen) {
       *isOpen = true;
       break;
     }
-    DeclaredName parameter;
-    parameter.type = type(false);
-    const Token parameterName = expectName("a name for the parameter");
-    parameter.name = parameterName.text;
-    parameter.nameSpan = parameterName.span;
-    if (accept("[")) {
-      expect("]", "after '['");
-      parameter.type.isArray = true;
-    }
+    const Type declared = type(false);
+    DeclaredName parameter = declaredName(declared, "a name for the parameter");
     if (accept("=")) parameter.value = expression();
     function.parameters.push_back(std::move(parameter));
     if (!accept(",")) break;
@@ -382,10 +379,8 @@ StatementPtr Parser::parameter(const Span& begin) {
   StatementPtr result = made(StatementKind::parameter, begin);
   result->parameter = std::make_unique<ParameterDeclaration>();
   ParameterDeclaration& parameter = *result->parameter;
-  parameter.declared.type = type(false);
-  const Token name = expectName("the name of the parameter");
-  parameter.declared.name = name.text;
-  parameter.declared.nameSpan = name.span;
+  const Type declared = type(false);
+  parameter.declared = declaredName(declared, "the name of the parameter");
   expect("=", "and the value that it has if nobody sets it");
   parameter.declared.value = expression();
   if (accept("in")) {
