@@ -409,6 +409,15 @@ if picture fireball; then
   keep fireball.jpg
 fi
 
+if picture felt; then
+  files=
+  for name in cumulus lenticular eruption smoke_ring nebula galaxy; do
+    "$program" render felt/$name.felt --preview $name.png --size 640x360 --quiet
+    files="$files $name.png"
+  done
+  padding=:pad=4 tiles felt.jpg 2x3 $files
+fi
+
 if picture hot_and_cold; then
   "$program" render felt/hot_and_cold.felt --preview hot_and_cold.png --size 640x640 --view 20,3 --set cells=120 --set steps=75 --quiet
   oiiotool hot_and_cold.png --quality 90 -o hot_and_cold.jpg

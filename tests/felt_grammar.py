@@ -12,14 +12,15 @@ def main(grammar, *scripts):
     rules = json.load(open(grammar))["patterns"]
     failed = 0
     for script in scripts:
-        end = None
+        end, inner = None, []
         for number, line in enumerate(open(script, encoding="utf-8"), 1):
             line = line.rstrip("\n")
             at = 0
             while at < len(line):
                 if end:
-                    found = end.search(line, at)
-                    at = found.end() if found else len(line)
+                    nested = next((found for rule in inner if (found := re.compile(rule["match"]).match(line, at))), None)
+                    found = None if nested else end.match(line, at)
+                    at = nested.end() if nested else found.end() if found else at + 1
                     end = None if found else end
                     continue
                 if line[at].isspace():
@@ -30,6 +31,7 @@ def main(grammar, *scripts):
                     if found and found.end() > at:
                         at = found.end()
                         end = re.compile(rule["end"]) if "end" in rule else None
+                        inner = rule.get("patterns", [])
                         break
                 else:
                     print(f"{script}:{number}:{at + 1}: no rule for {line[at]!r}")

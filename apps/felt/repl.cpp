@@ -199,26 +199,23 @@ class Repl {
   }
 
   void slice(std::string text) {
-    // The words behind the field come in any order.
     std::string picture;
     std::optional<std::pair<int, float>> plane;
     std::optional<std::pair<Vec3f, Vec3f>> ends;
-    for (bool isDone = false; !isDone;) {
+    // What stands behind the field comes in any order.
+    while (true) {
       const std::size_t space = text.rfind(' ');
       const std::string word = space == std::string::npos ? "" : text.substr(space + 1);
-      isDone = true;
+      const bool isPlane = word.size() > 2 && word[0] >= 'x' && word[0] <= 'z' && word[1] == '=';
       if (word.ends_with(".png"))
         picture = word;
-      else if (word.size() > 2 && word[0] >= 'x' && word[0] <= 'z' && word[1] == '=' &&
-               parseNumber(word.substr(2)))
+      else if (isPlane && parseNumber(word.substr(2)))
         plane = {word[0] - 'x', float(*parseNumber(word.substr(2)))};
-      else if (!ends && (ends = takeEnds(text))) {
-        isDone = false;
+      else if (!ends && (ends = takeEnds(text)))
         continue;
-      } else
-        continue;
+      else
+        break;
       text = trimmed(text.substr(0, space));
-      isDone = false;
     }
     Slice slice{ends ? Box{}.including(ends->first).including(ends->second) : boxOfSession()};
     const Vec3f size = slice.box.max - slice.box.min;
@@ -230,7 +227,7 @@ class Repl {
       for (const std::string& line : drawn(field, slice)) run_.result(line);
       return;
     }
-    writePng(picture, pictureOf(field, slice, kPicturePixels), {.shoulder = 1}, run_.metadata());
+    writePng(picture, pictureOf(field, slice, kPicturePixels), {.shoulder = 0.999f}, run_.metadata());
     run_.result("wrote " + picture);
   }
 

@@ -25,6 +25,9 @@ namespace nephele {
 namespace {
 // Bricks that a ray may leave behind at once; more would cost the passes more than it saves the rays.
 constexpr std::uint8_t kFarthest = 32;
+// Of the typical density: what glows in less lights others as if there were that much, so that what it gives
+// per optical depth stays finite and does not spread from there into what is dense.
+constexpr float kThinnestGlow = 0.01f;
 
 }  // namespace
 
@@ -244,7 +247,9 @@ float RenderVolume::emissionPerDensity(const Vec3f& world, int colour) const {
   const Vec3d place(density_->worldToIndex()(world));
   const auto valueOf = [&](const BrickGrid& grid) { return std::max(sampleGrid(grid, place), 0.0f); };
   const float density = valueOf(*density_);
-  return density > 0 && hasEmission() ? valueOf(*colour_.emission[std::size_t(colour)]) / density : 0.0f;
+  if (!(density > 0 && hasEmission())) return 0.0f;
+  return valueOf(*colour_.emission[std::size_t(colour)]) /
+         std::max(density, kThinnestGlow * typicalDensity());
 }
 
 float RenderVolume::typicalDensity() const {

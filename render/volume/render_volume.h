@@ -65,7 +65,8 @@ class RenderVolume {
   bool hasEmission() const { return colour_.emission[0] != nullptr; }
   /// What the albedo is multiplied by, mean over the density; 1 without a colour.
   const Vec3f& meanColour() const { return meanColour_; }
-  /// Emission over density at a world-space point; 0 where there is no density. Slow beside a march.
+  /// Emission over density at a world-space point; 0 where there is no density, and over a hundredth of the
+  /// typical one where there is less. Slow beside a march.
   float emissionPerDensity(const Vec3f& world, int colour) const;
   /// True where nothing in the volume is above zero.
   bool isEmpty() const { return occupied_.empty(); }

@@ -194,6 +194,45 @@ TEST(Scripts, LookTheSameWithAndWithoutAGrid) {
   EXPECT_LT(difference, 0.03 * total);
 }
 
+// In a sky alone, what is seen is in proportion to its radiance, and no brighter where the medium scatters
+// once.
+TEST(Scripts, SayWhatTheyAreLitBy) {
+  const TemporaryFolder folder;
+  const std::string script = folder.file("s.felt"), picture = folder.file("s.exr");
+  const auto brightness = [&](const std::string& lights, const std::string& options) {
+    writeScript(script,
+                "scalarfield density = mask(sphere((0,0,0), 1), 0.2);\nfloat extinction = 2;\n" + lights);
+    const ProgramResult result =
+        runProgram("render " + script + " -o " + picture +
+                   " --size 33x33 --no-backdrop --albedo 1,1,1 --octaves 1 --view 0,0 " + options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    const Image image = readImage(picture);
+    const std::size_t middle = 16 * 33 + 16;
+    return image.find("G")->values[middle] / image.find("A")->values[middle];
+  };
+  const std::string sky = "vector sky = (0, 0.5, 0);\n", noSun = "vector sun = (0, 0, 0);\n";
+  const float dark = brightness(sky + noSun, "");
+  EXPECT_GT(dark, 0.1f);
+  EXPECT_LT(dark, 0.51f);
+  EXPECT_NEAR(brightness(sky + noSun, "--sky 0,1,0"), 2 * dark, 0.02f * dark);
+  EXPECT_GT(brightness(sky + "vector sun = (0, 10, 5);\n", ""), 1.5f * dark);
+  EXPECT_EQ(brightness(sky + "vector sun = (0, 10, 5);\n", "--sun none"), dark);
+}
+
+// Gas that glows where there is next to no density gives off what cannot be told per optical depth.
+TEST(Scripts, MayGlowWhereThereIsNextToNoDensity) {
+  const TemporaryFolder folder;
+  const std::string script = folder.file("s.felt"), stats = folder.file("s.json");
+  writeScript(script,
+              "scalarfield density = exp(-square(identity().y / 0.035));\n"
+              "vectorfield emission = exp(-identity() * identity()) * (1, 0.5, 0.2);\n"
+              "domain bounds = domain((-1, -0.6, -1), (2, 1.2, 2), 0.02);\nfloat extinction = 25;\n");
+  const ProgramResult result = runProgram("render " + script + " -o " + folder.file("s.exr") +
+                                          " --size 48x32 --samples 1 --stats " + stats);
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(stats))["values_not_finite"], 0);
+}
+
 TEST(Scripts, ThatAreNoVolumesAreRefused) {
   const TemporaryFolder folder;
   const std::string script = folder.file("s.felt");
@@ -211,6 +250,10 @@ TEST(Scripts, ThatAreNoVolumesAreRefused) {
   refused("scalarfield density = mask(sphere((0,0,0), 1) - 2);", "nowhere above 0");
   refused("scalarfield density = mask(sphere((0,0,0), 1);", "s.felt:1:46: error: expected", 2);
   refused("scalarfield density;", "has no value");
+  const std::string ball = "scalarfield density = mask(sphere((0,0,0), 1), 0.1);\n";
+  refused(ball + "float extinction = -1;", "'extinction' is -1, allowed: 0 to 1e9");
+  refused(ball + "vector sky = (1, -1, 0);", "'sky' has -1, allowed: 0 to 1e9");
+  refused(ball + "vector sun = (0, 91, 1);", "an elevation from -90 to 90");
   EXPECT_EQ(folder.entryCount(), 1u);
 }
 

@@ -173,6 +173,56 @@ TEST_F(FeltVerb, RefusesOptionsOfOtherActions) {
   EXPECT_EQ(runProgram("felt dance").exitCode, 2);
 }
 
+TEST_F(FeltVerb, GivesScriptsTheNamesThatRenderGivesThem) {
+  const std::string path = script("scalarfield f = P.x;\nprint(time, seed, eval(f, (3, 0, 0)));\n");
+  EXPECT_EQ(runProgram("felt run " + path).output, "0 0 3\n");
+  EXPECT_EQ(runProgram("felt check " + path).exitCode, 0);
+}
+
+TEST_F(FeltVerb, AnswersLineByLine) {
+  const ProgramResult result =
+      piped("felt repl",
+            "float a = 2\n1 + 2 * a\nfunc float twice(float x) {\n  return 2 * x;\n}\n"
+            "twice(a);\ntwice(a)\n\"a = b\"\na == 2\n[1, 2]\nsphere((0,0,0), 1)\n:names\n:quit\n7\n");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_EQ(result.output,
+            "5 : float\n4 : float\na = b : string\ntrue : bool\n[1, 2] : int[]\na scalarfield\n"
+            "P = a vectorfield\ntime = 0 : float\nseed = 0 : int\na = 2 : float\n")
+      << result.errors;
+}
+
+TEST_F(FeltVerb, GoesOnAfterAFaultInALine) {
+  const ProgramResult result = piped("felt repl", "spere((0,0,0), 1)\n:dance\n:plot 1\n1 + 1\n");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_EQ(result.output, "2 : int\n");
+  EXPECT_TRUE(contains(result.errors, "line 1:1:1: error: there is no function 'spere'")) << result.errors;
+  EXPECT_TRUE(contains(result.errors, "there is no command ':dance'")) << result.errors;
+  EXPECT_TRUE(contains(result.errors, ":plot FIELD from (x, y, z) to (x, y, z)")) << result.errors;
+}
+
+TEST_F(FeltVerb, PlotsAFieldAlongALine) {
+  const ProgramResult result = piped("felt repl", ":plot P.x from (-1, 0, 0) to (3, 0, 0)\n");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  // Twelve lines of letters, and one that names the ends; the curve rises from -1 to 3.
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 13) << result.output;
+  EXPECT_TRUE(result.output.starts_with("         3 ")) << result.output;
+  EXPECT_TRUE(contains(result.output, "\n        -1 ")) << result.output;
+  EXPECT_TRUE(contains(result.output, "(-1, 0, 0)")) << result.output;
+}
+
+TEST_F(FeltVerb, SlicesAFieldAsTextAndAsAPicture) {
+  const std::string picture = folder_.file("slice.png");
+  const ProgramResult result =
+      piped("felt repl", "scalarfield ball = sphere((0,0,0), 1)\n:slice ball z=0\n:slice ball x=0.5 " +
+                             picture + " from (-2, -1, -1) to (2, 1, 1)\n");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_TRUE(contains(result.output, "z = 0, x to the right, y up")) << result.output;
+  EXPECT_TRUE(contains(result.output, "@")) << result.output;
+  // The box is as wide in z as it is high in y.
+  const ProgramResult info = runProgram("info " + picture);
+  EXPECT_TRUE(contains(info.output, "512")) << info.output << info.errors;
+}
+
 TEST_F(FeltVerb, RunsTheScriptsOfTheProject) {
   for (const auto& entry : std::filesystem::directory_iterator(ownData("data/felt"))) {
     if (entry.path().extension() != ".felt") continue;

@@ -233,6 +233,7 @@ void addSky(CLI::App& app, LightOptions& options) {
   app.add_option_function<std::string>(
          "--sky",
          [&options](const std::string& text) {
+           options.skyGiven = true;
            options.turbidity.reset();
            if (isFile(text)) {
              options.skyFile = text;
@@ -321,6 +322,20 @@ void addLightOptions(CLI::App& app, LightOptions& options) {
 void addShadowOutput(CLI::App& app, LightOptions& options) {
   markOutput(addFiles(app, "--write-deep-shadow", options.writtenShadows,
                       "Writes the deep shadow map of a light; without a name, of the only one."));
+}
+
+void LightOptions::suggestSky(const Vec3f& radiance) {
+  if (skyGiven) return;
+  turbidity.reset();
+  lights.sky = radiance;
+}
+
+void LightOptions::suggestSun(double azimuth, double elevation, double irradiance) {
+  if (noSun || !lights.suns.empty() || !lights.locals.empty()) return;
+  if (irradiance == 0)
+    noSun = true;
+  else
+    lights.suns.push_back(sunOf("sun", {azimuth, elevation}, Vec3f{1, 1, 1} * float(irradiance)));
 }
 
 bool LightOptions::readsCodes() const {

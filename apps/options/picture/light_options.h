@@ -39,7 +39,13 @@ struct LightOptions {
   /// Numbers of suns whose irradiance is that of the clear sky, if there is one.
   std::vector<std::size_t> sunsOfTheSky;
   Environment::Options sky;
+  /// --sky was said.
+  bool skyGiven = false;
 
+  /// What a script asks for where the command line does not: a sky of one radiance, and one sun (degrees; no
+  /// sun if its irradiance is 0).
+  void suggestSky(const Vec3f& radiance);
+  void suggestSun(double azimuth, double elevation, double irradiance);
   /// The lights of the picture; one sun where no light is given but a sky without a map. Reads the sky's map.
   /// Percentages are of `longestSide`. @throws Error if a name is unknown or taken twice, or a file cannot be
   /// read.

@@ -25,6 +25,7 @@ struct ScriptScene {
   std::optional<VectorField> color, emission, velocity;
   std::optional<ScalarField> temperature;
   std::optional<double> extinction;
+  std::optional<Vec3d> sky, sun;
 
   bool hasOthers() const { return color || emission || velocity || temperature; }
 };
@@ -99,6 +100,8 @@ ScriptScene runScript(const std::string& path, const ScriptOptions& options, con
   if (!picture.shutter.isInstant())
     scene.velocity = declared.as<VectorField>("velocity", felt::Kind::vectorField);
   scene.extinction = declared.as<double>("extinction", felt::Kind::number);
+  scene.sky = declared.as<Vec3d>("sky", felt::Kind::vector);
+  scene.sun = declared.as<Vec3d>("sun", felt::Kind::vector);
   return scene;
 }
 
@@ -111,6 +114,27 @@ VolumePart::Grids threeGrids(const VectorField& field, const BakeOptions& baking
 VectorField notNegative(const VectorField& field) {
   return vectorField(max(component(field, 0), 0.0f), max(component(field, 1), 0.0f),
                      max(component(field, 2), 0.0f));
+}
+
+/// Takes what the script says of the picture where the command line does not.
+void suggest(const std::string& path, const ScriptScene& scene, PictureOptions& picture) {
+  constexpr double kMost = 1e9;
+  const auto isWithin = [](double x, double least, double most) { return x >= least && x <= most; };
+  if (scene.extinction && !isWithin(*scene.extinction, 0, kMost))
+    throw Error(fmt::format("{}: 'extinction' is {:g}, allowed: 0 to 1e9", path, *scene.extinction));
+  if (scene.sky)
+    for (int c = 0; c < 3; ++c)
+      if (!isWithin((*scene.sky)[c], 0, kMost))
+        throw Error(fmt::format("{}: 'sky' has {:g}, allowed: 0 to 1e9", path, (*scene.sky)[c]));
+  if (scene.sun && !(isWithin(scene.sun->x, -36000, 36000) && isWithin(scene.sun->y, -90, 90) &&
+                     isWithin(scene.sun->z, 0, kMost)))
+    throw Error(
+        fmt::format("{}: 'sun' is ({:g}, {:g}, {:g}), allowed: an azimuth, an elevation from -90 to 90, "
+                    "and an irradiance from 0 to 1e9",
+                    path, scene.sun->x, scene.sun->y, scene.sun->z));
+  if (scene.extinction && !picture.extinction) picture.extinction = float(*scene.extinction);
+  if (scene.sky) picture.light.suggestSky(felt::toFloat(*scene.sky));
+  if (scene.sun) picture.light.suggestSun(scene.sun->x, scene.sun->y, scene.sun->z);
 }
 
 /// All that the script declares, sampled at one voxel size.
@@ -165,11 +189,7 @@ bool isScript(const std::vector<std::string>& paths) {
 RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture,
                           Run& run) {
   const ScriptScene scene = runScript(path, options, picture, run);
-  if (scene.extinction && !picture.extinction) {
-    if (!(*scene.extinction >= 0 && *scene.extinction <= 1e9))
-      throw Error(fmt::format("{}: 'extinction' is {:g}, allowed: 0 to 1e9", path, *scene.extinction));
-    picture.extinction = float(*scene.extinction);
-  }
+  suggest(path, scene, picture);
   const bool isExact = options.detail == ScriptOptions::Detail::exact;
   if (isExact && scene.hasOthers())
     throw Error(path +
@@ -179,7 +199,7 @@ RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options,
     // What the camera frames shows only once the script has been looked at.
     const float side = scene.box.longestSide();
     const RenderVolume coarse =
-        sampledVolume({scene.density, scene.box, {}, {}, {}, {}, {}}, side / kCoarse, picture, run);
+        sampledVolume({scene.density, scene.box, {}, {}, {}, {}, {}, {}, {}}, side / kCoarse, picture, run);
     if (coarse.isEmpty()) return coarse;
     const Camera camera = static_cast<const CameraOptions&>(picture).placed(extentOf(coarse), run).camera();
     FieldVolumeOptions field{.box = scene.box,

@@ -37,6 +37,8 @@ bool isScript(const std::vector<std::string>& paths);
 ///     scalarfield temperature      glows as a black body, kelvin
 ///     vectorfield velocity         world units per second, blurs while the shutter is open
 ///     float extinction             where --extinction is not given
+///     vector sky                   radiance of the sky, where --sky is not given
+///     vector sun                   azimuth, elevation and irradiance, where no light is given
 ///
 /// `time` is the frame, `seed` that of the picture. @throws felt::ScriptError; Error naming the file where it
 /// declares no density, or one that ends nowhere.
