@@ -418,6 +418,14 @@ if picture felt; then
   padding=:pad=4 tiles felt.jpg 2x3 $files
 fi
 
+if picture tutorial_07; then
+  for name in first second third; do
+    sed -n "/^cat >$name.felt/,/^END/p" "$docs/tutorial_07_cloud_from_a_script.md" | sed '1d;$d' >$name.felt
+    show $name $name.felt --size 480x360
+  done
+  padding="" tiles tutorial_07.jpg 3x1 first.png second.png third.png
+fi
+
 if picture hot_and_cold; then
   "$program" render felt/hot_and_cold.felt --preview hot_and_cold.png --size 640x640 --view 20,3 --set cells=120 --set steps=75 --quiet
   oiiotool hot_and_cold.png --quality 90 -o hot_and_cold.jpg
