@@ -125,6 +125,8 @@ struct Line {
   std::optional<Sequence> sequence;
   std::optional<Wedge> wedge;
   SeveralCalls calls{};
+  /// Those that came from files and looks, as they would be typed.
+  std::string configOptions{};
 
   bool isSeveral() const { return sequence || wedge; }
   std::vector<std::string> first() const { return isSeveral() ? calls.at(0).arguments : arguments; }
@@ -205,6 +207,32 @@ void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramR
                  *std::ranges::find(verbs, "render", &Verb::name), run);
 }
 
+/// What `arguments` stand for; `command` has read those of its first call.
+Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<std::string> arguments,
+                const std::function<void(const std::string&)>& note) {
+  const std::string& name = command.verb.name;
+  const std::vector<std::string> names = namesOf(verbs);
+  const auto withSettings = [&](std::vector<std::string> typed) {
+    return withConfigFile({command.app, name, names}, std::move(typed));
+  };
+  arguments = withCurrentNames(name, withFilesAfterDashes(std::move(arguments)), note);
+  Line line = lineOf(command, arguments, withSettings);
+  const std::vector<std::string> settings = withSettings(arguments);
+  line.configOptions = joined(std::span(settings).subspan(arguments.size()));
+  command.parse(line.first());
+  return line;
+}
+
+/// Works on as many threads as the options say.
+template <class Work>
+auto withThreads(const CommonOptions& options, const Work& work) {
+  using tbb::global_control;
+  constexpr auto kMost = global_control::max_allowed_parallelism;
+  const global_control limit(
+      kMost, options.threads > 0 ? std::size_t(options.threads) : global_control::active_value(kMost));
+  return work();
+}
+
 int runVerb(const Verb& verb, const std::vector<Verb>& verbs, std::vector<std::string> arguments,
             const std::string& commandLine) {
   Command command(verb);
@@ -214,22 +242,12 @@ int runVerb(const Verb& verb, const std::vector<Verb>& verbs, std::vector<std::s
     const auto note = [&](const std::string& sentence) {
       std::fputs((who + ": " + sentence + "\n").c_str(), stderr);
     };
-    const std::vector<std::string> names = namesOf(verbs);
-    const auto withSettings = [&](std::vector<std::string> typed) {
-      return withConfigFile({command.app, verb.name, names}, std::move(typed));
-    };
-    arguments = withCurrentNames(verb.name, withFilesAfterDashes(std::move(arguments)), note);
-    Line line = lineOf(command, arguments, withSettings);
-    const std::vector<std::string> settings = withSettings(arguments);
-    command.parse(line.first());
+    Line line = parsedLine(command, verbs, std::move(arguments), note);
     ProgramRun run(verb.name, options);
     run.commandLine = commandLine;
-    run.configOptions = joined(std::span(settings).subspan(arguments.size()));
-    const std::size_t threads =
-        options.threads > 0 ? std::size_t(options.threads)
-                            : tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return runWork(who, run, options, [&] { work(command, line, verbs, run); });
+    run.configOptions = line.configOptions;
+    return withThreads(options,
+                       [&] { return runWork(who, run, options, [&] { work(command, line, verbs, run); }); });
   } catch (const CLI::CallForAllHelp&) {
     std::cout << command.app.help();
     return 0;
@@ -260,6 +278,27 @@ std::string overview(const std::vector<Verb>& verbs) {
 }
 
 }  // namespace
+
+std::vector<Verb> allVerbs() {
+  return {levelsetVerb(), cloudVerb(),     advectVerb(), wispsVerb(),     meshVerb(), cutVerb(),
+          transferVerb(), transformVerb(), renderVerb(), turntableVerb(), infoVerb(), feltVerb()};
+}
+
+nlohmann::json callVerb(const std::string& name, std::vector<std::string> arguments, const MakeRun& makeRun) {
+  const std::vector<Verb> verbs = allVerbs();
+  const auto verb = std::ranges::find(verbs, name, &Verb::name);
+  require(verb != verbs.end(), "there is no verb '" + name + "'");
+  Command command(*verb);
+  const std::string commandLine = "nephele " + name + " " + joined(arguments);
+  Line line = parsedLine(command, verbs, std::move(arguments), [](const std::string&) {});
+  const std::unique_ptr<ProgramRun> run = makeRun(name, command.options);
+  run->commandLine = commandLine;
+  run->configOptions = line.configOptions;
+  withThreads(command.options, [&] { work(command, line, verbs, *run); });
+  run->finish();
+  if (!command.options.stats.empty()) writeStatistics(command.options.stats, run->statistics());
+  return run->statistics();
+}
 
 int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   installSignalHandlers();

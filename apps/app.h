@@ -141,6 +141,19 @@ Verb turntableVerb();
 Verb infoVerb();
 Verb feltVerb();
 
+/// Every verb, in the order of the overview.
+std::vector<Verb> allVerbs();
+
+class ProgramRun;
+struct CommonOptions;
+/// Makes what a verb, by its name, is run with.
+using MakeRun = std::function<std::unique_ptr<ProgramRun>(const std::string& verb, const CommonOptions&)>;
+
+/// Does what the program does for these arguments of a verb, and returns the statistics; nothing is printed
+/// but by the run. @throws CLI::Error and felt::ScriptError for arguments that cannot be used, Error,
+/// Cancelled.
+nlohmann::json callVerb(const std::string& name, std::vector<std::string> arguments, const MakeRun& makeRun);
+
 /// Parses the command line, runs one verb, and returns the exit code: 0 success, 1 failed, 2 usage, 128 +
 /// signal where a signal stopped it.
 int runProgram(int argc, char** argv, const std::vector<Verb>& verbs);

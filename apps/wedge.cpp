@@ -15,7 +15,7 @@
 namespace nephele::apps {
 namespace {
 
-constexpr const char* kForm =
+constexpr const char* kWedgeForm =
     "OPTION=VALUES, as in seed=1-12, billow=0,0.5,1,2 or sun=90,38;120,10 (several options: once more)";
 constexpr std::string_view kNever[]{"frames",        "only",   "shard", "skip-existing", "wedge",
                                     "contact-sheet", "stats",  "quiet", "verbose",       "progress",
@@ -53,7 +53,7 @@ std::vector<std::string> valuesOf(const std::string& text) {
     const std::size_t end = std::min(text.find(separator, at), text.size());
     const std::string part = text.substr(at, end - at);
     at = end + 1;
-    if (part.empty()) refuseValue("--wedge", text, kForm);
+    if (part.empty()) refuseValue("--wedge", text, kWedgeForm);
     if (parseNumber(part)) {
       values.push_back(part);
       continue;
@@ -110,7 +110,7 @@ std::optional<Wedge> Wedge::taken(std::vector<std::string>& arguments, const CLI
   for (const std::string& text : wedges) {
     const std::size_t equals = text.find('=');
     Axis axis{text.substr(0, equals), {}, false};
-    if (equals == std::string::npos || equals == 0) refuseValue("--wedge", text, kForm);
+    if (equals == std::string::npos || equals == 0) refuseValue("--wedge", text, kWedgeForm);
     const CLI::Option* option = app.get_option_no_throw("--" + axis.option);
     if (!option || isOutput(*option) || std::ranges::count(kNever, axis.option) > 0) {
       std::vector<std::string> names;

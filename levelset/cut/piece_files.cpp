@@ -21,6 +21,7 @@
 
 #include "nephele/levelset/cut/detail/piece_folder.h"
 #include "nephele/levelset/cut/detail/piece_measures.h"
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/obj_text.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -326,10 +327,12 @@ std::vector<Vec3d> explodedOffsets(const Pieces& pieces, double explode) {
 std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptions& options,
                                      const Progress& progress) {
   require(!pieces.pieces.empty(), "there are no pieces to write");
+  if (MemoryFile::put(options.folder, std::make_shared<const Pieces>(pieces))) return {};
   return PieceWriter(pieces, options).write(progress);
 }
 
 void requireWritableFolder(const std::string& folder) {
+  if (MemoryFile::find(folder)) return;
   PieceFolder trial(folder);
   trial.expect({PieceFolder::kList});
   trial.temporary(0);

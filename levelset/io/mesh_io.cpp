@@ -21,6 +21,7 @@
 #include <system_error>
 
 #include "nephele/levelset/io/detail/mesh_io_private.h"
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 
@@ -224,6 +225,11 @@ bool isMeshFile(const std::string& path) {
 }
 
 Mesh readMesh(const std::string& path) {
+  if (const auto* held = MemoryFile::contentOf<std::shared_ptr<const Mesh>>(path)) {
+    require((*held)->faceCount() > 0,
+            fmt::format("{}: has no faces ({} vertices)", path, (*held)->positions.size()));
+    return **held;
+  }
   const std::string content = detail::readWholeFile(path);
   const detail::MeshFile file{path, content};
   Mesh mesh;
@@ -247,6 +253,7 @@ void writeMesh(const std::string& path, const Mesh& mesh) {
           fmt::format("cannot write {}: unknown mesh format '{}'; .obj, .ply and .stl can be written", path,
                       extension));
 
+  if (MemoryFile::put(path, std::make_shared<const Mesh>(mesh))) return;
   OutputFile output(path);
   OutputStream stream(output);
   namingFile(path, [&] { write(stream.file(), mesh); });

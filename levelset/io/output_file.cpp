@@ -19,6 +19,7 @@
 #include <system_error>
 #include <utility>
 
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {
@@ -93,6 +94,7 @@ std::string outputTarget(const std::string& path) {
 }
 
 bool isStream(const std::string& path) {
+  if (MemoryFile::find(path)) return true;
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);

@@ -11,7 +11,8 @@ namespace nephele {
 /// The file that writing to `path` is about: where a symbolic link leads, or `path` itself.
 std::string outputTarget(const std::string& path);
 
-/// Whether `path` is something that bytes go into and that must not be replaced: a device, a pipe, a socket.
+/// Whether `path` is something that bytes go into and that must not be replaced: a device, a pipe, a socket;
+/// or a MemoryFile.
 bool isStream(const std::string& path);
 
 /// An output that appears whole or not at all: written under a temporary name in the target's folder, then

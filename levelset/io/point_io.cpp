@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "nephele/levelset/io/detail/mesh_io_private.h"
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 
@@ -54,6 +55,10 @@ Mesh readTable(const detail::MeshFile& file) {
 }  // namespace
 
 Mesh readPoints(const std::string& path) {
+  if (const auto* held = MemoryFile::contentOf<std::shared_ptr<const Mesh>>(path)) {
+    require(!(*held)->positions.empty(), path + ": has no points");
+    return **held;
+  }
   const std::string content = detail::readWholeFile(path);
   const detail::MeshFile file{path, content};
   const auto endsIn = [&](std::string_view extension) { return path.ends_with(extension); };

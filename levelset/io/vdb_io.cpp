@@ -12,6 +12,7 @@
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
 
@@ -64,8 +65,16 @@ auto translateReadErrors(const std::string& path, const Body& body) {
 }
 
 std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const detail::WantedGrid& wanted) {
-  checkReadable(path);
   detail::initializeOpenVdb();
+  if (const auto* held = MemoryFile::contentOf<std::vector<VdbGrid>>(path)) {
+    std::vector<openvdb::GridBase::Ptr> grids;
+    for (const VdbGrid& grid : *held) {
+      wanted(*grid.impl().grid, grid.impl().grid->getName());
+      grids.push_back(grid.impl().grid);
+    }
+    return grids;
+  }
+  checkReadable(path);
   return translateReadErrors(path, [&] {
     return lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path, wanted)
                                            : detail::readOpenVdb(path, wanted);
@@ -172,6 +181,12 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
     }
     requireReadableTexts(path, *copy);
     labelled.push_back(copy);
+  }
+  if (MemoryFile::find(path)) {
+    std::vector<VdbGrid> kept;
+    for (const auto& grid : labelled) kept.push_back(detail::wrapGrid(grid));
+    MemoryFile::put(path, kept);
+    return;
   }
   OutputFile output(path);
   try {

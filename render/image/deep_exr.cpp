@@ -14,6 +14,7 @@
 #include <array>
 #include <cmath>
 
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/deep_image.h"
@@ -95,6 +96,10 @@ void writeDeepExr(const OutputFile& output, const DeepImage& image, const ImageC
 
 void writeExrPair(const ExrPair& paths, const Image& flat, const DeepImage& deep, const ImageCamera& camera,
                   const std::map<std::string, std::string>& metadata) {
+  if (MemoryFile::find(paths.flat)) {
+    writeDeepExr(paths.deep, deep, camera, metadata);
+    return writeExr(paths.flat, flat, camera, metadata);
+  }
   OutputFile flatFile(paths.flat), deepFile(paths.deep);
   writeDeepExr(deepFile, deep, camera, metadata);
   writeExr(flatFile, flat, camera, metadata);

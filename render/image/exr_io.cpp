@@ -22,6 +22,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -161,6 +162,7 @@ std::optional<ImageCamera> readImageCamera(const std::string& path) {
 
 void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
+  if (MemoryFile::put(path, ExrContent{image, camera, metadata})) return;
   OutputFile output(path);
   writeExr(output, image, camera, metadata);
   output.commit();

@@ -13,6 +13,13 @@ namespace nephele {
 
 class OutputFile;
 
+/// What a MemoryFile holds of a picture that was written to it.
+struct ExrContent {
+  Image image;
+  ImageCamera camera;
+  std::map<std::string, std::string> metadata;
+};
+
 /// Writes an OpenEXR file, ZIP compressed: channels as 16 or 32 bit floats as they say, linear Rec. 709.
 ///
 /// Carries `chromaticities`, `worldToCamera` and `worldToNDC` of the camera (a Camera will do; for row

@@ -12,6 +12,7 @@
 #include <set>
 #include <system_error>
 
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/exr_io.h"
 
@@ -94,11 +95,13 @@ void apply(const TransferCurve& curve, const std::string& type, std::vector<floa
 }  // namespace
 
 Image readImage(const std::string& path, double mostBytes) {
+  if (const auto* held = MemoryFile::contentOf<ExrContent>(path)) return held->image;
   detail::ImageHeader header;
   return readPixels(path, mostBytes, header);
 }
 
 Image readLinearImage(const std::string& path, ColourEncoding encoding, double mostBytes) {
+  if (const auto* held = MemoryFile::contentOf<ExrContent>(path)) return held->image;
   detail::ImageHeader header;
   Image image = readPixels(path, mostBytes, header);
   const bool isGrey = image.find("Y") && !image.find("R");
