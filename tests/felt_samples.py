@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Runs every ```felt sample of pages as a script of its own, and fails where one of them does.
+"""Runs every ```felt sample of pages as a script of its own, in a folder that has data/, and fails where one of them does.
 
 Usage: felt_samples.py PROGRAM PAGE...
 """
 import re
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 
 def main(program, *pages):
@@ -16,7 +18,9 @@ def main(program, *pages):
             print(f"{page}: has no sample")
             failed = 1
         for number, sample in enumerate(samples, 1):
-            done = subprocess.run([program, "felt", "run", "-"], input=sample, text=True, capture_output=True)
+            with tempfile.TemporaryDirectory(prefix="nephele_felt_") as folder:
+                (Path(folder) / "data").symlink_to(Path("data").resolve())
+                done = subprocess.run([program, "felt", "run", "-"], input=sample, text=True, capture_output=True, cwd=folder)
             if done.returncode or "error" in done.stderr:
                 print(f"{page}, sample {number}:\n{done.stderr}")
                 failed = 1

@@ -3,6 +3,7 @@
 #include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
+#include "nephele/render/felt/render_functions.h"
 
 namespace nephele::apps {
 
@@ -25,6 +26,7 @@ std::unique_ptr<felt::Registry> allFunctions() {
   auto registry = std::make_unique<felt::Registry>();
   felt::addModelingFunctions(*registry);
   felt::addLevelsetFunctions(*registry);
+  felt::addRenderFunctions(*registry);
   return registry;
 }
 

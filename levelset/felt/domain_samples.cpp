@@ -258,9 +258,14 @@ double sampledBytes(const Domain& domain, int components) {
   return kMaking * bricks * components * BrickGrid::kVolume * sizeof(float);
 }
 
+double allowedBytes(const Context& context) {
+  constexpr double kShare = 0.8;
+  return context.limits.memoryBytes.value_or(kShare * allowedMemory());
+}
+
 void requireBytes(double needed, const std::string& what, const std::string& hint, const Context& context) {
-  constexpr double kShare = 0.8, kGigabyte = 1e9;
-  const double allowed = context.limits.memoryBytes.value_or(kShare * allowedMemory());
+  constexpr double kGigabyte = 1e9;
+  const double allowed = allowedBytes(context);
   if (needed > allowed)
     throw CallError(Code::limit,
                     fmt::format("{} may take {:.3g} GB, and {:.3g} GB are allowed", what, needed / kGigabyte,

@@ -23,6 +23,8 @@ Affine sampleToWorld(const Domain& domain);
 template <class T>
 Field<T> sampled(const Field<T>& field, const Domain& domain, const Context& context);
 
+/// Bytes that one function may sample or make.
+double allowedBytes(const Context& context);
 /// Refuses what needs more memory than `context` allows. `what` and `hint` go into the message.
 /// @throws CallError
 void requireBytes(double needed, const std::string& what, const std::string& hint, const Context& context);

@@ -21,6 +21,7 @@
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 #include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/volume_parts.h"
 
 namespace nephele {
 
@@ -28,6 +29,8 @@ namespace {
 
 constexpr int kLevels = 6;
 constexpr float kFinest = 1e-5f;
+// Along the box at most, of what changes slowly.
+constexpr float kVelocityVoxels = 128;
 
 Box octant(const Box& box, int index) {
   const Vec3f middle = (box.min + box.max) * 0.5f;
@@ -103,6 +106,17 @@ void check(const FieldVolumeOptions& options) {
   require(options.mostBytes > 0, fmt::format("most bytes: expected a number > 0, got {}", options.mostBytes));
 }
 
+VolumePart::Grids threeGrids(const VectorField& field, const BakeOptions& baking, const Progress& progress) {
+  VolumePart::Grids grids;
+  for (std::size_t c = 0; c < 3; ++c) grids[c] = bakeGrid(component(field, int(c)), baking, progress);
+  return grids;
+}
+
+VectorField notNegative(const VectorField& field) {
+  return vectorField(max(component(field, 0), 0.0f), max(component(field, 1), 0.0f),
+                     max(component(field, 2), 0.0f));
+}
+
 }  // namespace
 
 float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
@@ -132,6 +146,31 @@ RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const
   baking.box = options.box;
   baking.background = 0.0f;
   return RenderVolume(bakeGrid(max(density, 0.0f), baking, progress));
+}
+
+RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progress& progress) {
+  const BakeOptions baking{.voxelSize = voxelSize, .box = parts.box, .background = 0.0f};
+  VolumePart part;
+  progress.begin("sample");
+  part.density = bakeGrid(max(parts.density, 0.0f), baking, progress);
+  // Where there is nothing, nobody asks for its colour.
+  if (parts.colour) part.colour = threeGrids(*parts.colour * mask(parts.density), baking, progress);
+  if (parts.emission) part.emission = threeGrids(notNegative(*parts.emission), baking, progress);
+  if (parts.temperature) part.temperature = bakeGrid(max(*parts.temperature, 0.0f), baking, progress);
+  part.temperatureScale = 1.0f;
+  part.emissionScale = parts.emissionScale;
+  if (parts.velocity) {
+    const float side = parts.box.longestSide();
+    // Known as far as things move.
+    const BakeOptions coarse{.voxelSize = std::max(voxelSize, side / kVelocityVoxels),
+                             .box = parts.box.expanded(0.25f * side),
+                             .background = 0.0f};
+    part.velocity = threeGrids(*parts.velocity, coarse, progress);
+    part.shutter = parts.shutter;
+  }
+  part.share = parts.share;
+  check(part);
+  return combine({part}, progress);
 }
 
 RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,

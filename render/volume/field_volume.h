@@ -1,9 +1,12 @@
 #pragma once
 
+#include <optional>
+
 #include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/field/field.h"
 #include "nephele/render/scene/camera.h"
+#include "nephele/render/scene/camera_motion.h"
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele {
@@ -35,6 +38,25 @@ float fieldVoxelSize(const ScalarField& density, const Camera& camera, const Fie
 /// @throws Error as fieldVoxelSize and bakeGrid do; Cancelled.
 RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
                          const Progress& progress = silent());
+
+/// All that fields may say of a volume. Values below zero count as zero.
+struct FieldParts {
+  ScalarField density{0.0f};
+  /// Where there may be anything.
+  Box box;
+  /// See VolumePart: its colour, its light, its temperature in kelvin, its velocity in world units per frame.
+  std::optional<VectorField> colour{}, emission{}, velocity{};
+  std::optional<ScalarField> temperature{};
+  float emissionScale = 1.0f;
+  /// Blurs what has a velocity.
+  Shutter shutter{};
+  /// Multiplies the density.
+  float share = 1.0f;
+};
+
+/// All of it sampled with voxels of one size, world units; velocities as finely as a 128th of the box.
+/// @throws Error as bakeGrid and combine do; Cancelled.
+RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progress& progress = silent());
 
 /// A density that rays ask the field for: no grid is between it and the picture, and detail is as fine as the
 /// picture asks for, see FieldDensity and Refinement. Values below zero count as zero; outside of the box

@@ -4,6 +4,7 @@
 #include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/modeling/felt/program.h"
 #include "nephele/modeling/field/space.h"
+#include "nephele/render/felt/render_functions.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
 
@@ -18,6 +19,7 @@ const Registry& allFunctions() {
     auto* made = new Registry;
     felt::addModelingFunctions(*made);
     felt::addLevelsetFunctions(*made);
+    felt::addRenderFunctions(*made);
     return made;
   }();
   return *registry;

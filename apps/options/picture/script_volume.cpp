@@ -8,11 +8,9 @@
 
 #include "apps/felt/felt_scripts.h"
 #include "nephele/levelset/felt/field_extent.h"
-#include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/felt/program.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/render/volume/field_volume.h"
-#include "nephele/render/volume/volume_parts.h"
 
 namespace nephele::apps {
 
@@ -20,21 +18,18 @@ namespace {
 
 /// What a script declares of a volume.
 struct ScriptScene {
-  ScalarField density{0.0f};
-  Box box;
-  std::optional<VectorField> color, emission, velocity;
-  std::optional<ScalarField> temperature;
+  FieldParts parts;
   std::optional<double> extinction;
   std::optional<Vec3d> sky, sun;
 
-  bool hasOthers() const { return color || emission || velocity || temperature; }
+  bool hasOthers() const { return parts.colour || parts.emission || parts.velocity || parts.temperature; }
 };
 
 /// The share of the memory allowed that the samples of a script may take; the light takes as much again.
 constexpr double kMemoryShare = 0.25;
 constexpr double kMostBytes = 4e9;
-/// Voxels along the box in which a script is looked at to frame it, and at most for what changes slowly.
-constexpr int kCoarse = 96, kSlow = 128;
+/// Voxels along the box in which a script is looked at to frame it.
+constexpr int kCoarse = 96;
 
 class Declared {
  public:
@@ -80,40 +75,35 @@ ScriptScene runScript(const std::string& path, const ScriptOptions& options, con
   const Declared declared(path, program.run(context, {.settings = settingsOf(options.settings, program)}));
 
   ScriptScene scene;
+  FieldParts& parts = scene.parts;
   const auto density = declared.as<ScalarField>("density", felt::Kind::scalarField);
   if (!density)
     throw Error(path +
                 ": declares no 'density'; a script that is looked at says 'scalarfield density = ...;'");
-  scene.density = *density;
+  parts.density = *density;
   if (const auto bounds = declared.as<felt::Domain>("bounds", felt::Kind::domain))
-    scene.box = bounds->bounds();
+    parts.box = bounds->bounds();
   else
-    scene.box = namingFile(path, [&] { return felt::extentOf(scene.density, run); });
-  scene.color = declared.as<VectorField>("color", felt::Kind::vectorField);
+    parts.box = namingFile(path, [&] { return felt::extentOf(parts.density, run); });
+  parts.colour = declared.as<VectorField>("color", felt::Kind::vectorField);
   if (declared.isScalar("emission")) {
     const auto white = *declared.as<ScalarField>("emission", felt::Kind::scalarField);
-    scene.emission = vectorField(white, white, white);
+    parts.emission = vectorField(white, white, white);
   } else {
-    scene.emission = declared.as<VectorField>("emission", felt::Kind::vectorField);
+    parts.emission = declared.as<VectorField>("emission", felt::Kind::vectorField);
   }
-  scene.temperature = declared.as<ScalarField>("temperature", felt::Kind::scalarField);
-  if (!picture.shutter.isInstant())
-    scene.velocity = declared.as<VectorField>("velocity", felt::Kind::vectorField);
+  parts.temperature = declared.as<ScalarField>("temperature", felt::Kind::scalarField);
+  parts.emissionScale = float(picture.volumes.emissionScale);
+  if (!picture.shutter.isInstant()) {
+    parts.velocity = declared.as<VectorField>("velocity", felt::Kind::vectorField);
+    if (parts.velocity) *parts.velocity = *parts.velocity * ScalarField(float(picture.volumes.velocityScale));
+    parts.shutter = picture.shutter;
+  }
+  if (!picture.volumes.densityScales.empty()) parts.share = float(picture.volumes.densityScales[0]);
   scene.extinction = declared.as<double>("extinction", felt::Kind::number);
   scene.sky = declared.as<Vec3d>("sky", felt::Kind::vector);
   scene.sun = declared.as<Vec3d>("sun", felt::Kind::vector);
   return scene;
-}
-
-VolumePart::Grids threeGrids(const VectorField& field, const BakeOptions& baking, Run& run) {
-  VolumePart::Grids grids;
-  for (std::size_t c = 0; c < 3; ++c) grids[c] = bakeGrid(component(field, int(c)), baking, run);
-  return grids;
-}
-
-VectorField notNegative(const VectorField& field) {
-  return vectorField(max(component(field, 0), 0.0f), max(component(field, 1), 0.0f),
-                     max(component(field, 2), 0.0f));
 }
 
 /// Takes what the script says of the picture where the command line does not.
@@ -135,32 +125,6 @@ void suggest(const std::string& path, const ScriptScene& scene, PictureOptions& 
   if (scene.extinction && !picture.extinction) picture.extinction = float(*scene.extinction);
   if (scene.sky) picture.light.suggestSky(felt::toFloat(*scene.sky));
   if (scene.sun) picture.light.suggestSun(scene.sun->x, scene.sun->y, scene.sun->z);
-}
-
-/// All that the script declares, sampled at one voxel size.
-RenderVolume sampledVolume(const ScriptScene& scene, float voxelSize, const PictureOptions& picture,
-                           Run& run) {
-  BakeOptions baking{.voxelSize = voxelSize, .box = scene.box, .background = 0.0f};
-  VolumePart part;
-  run.begin("sample");
-  part.density = bakeGrid(max(scene.density, 0.0f), baking, run);
-  // Where there is nothing, nobody asks for its colour.
-  if (scene.color) part.colour = threeGrids(*scene.color * mask(scene.density), baking, run);
-  if (scene.emission) part.emission = threeGrids(notNegative(*scene.emission), baking, run);
-  if (scene.temperature) part.temperature = bakeGrid(max(*scene.temperature, 0.0f), baking, run);
-  part.temperatureScale = 1.0f;
-  part.emissionScale = float(picture.volumes.emissionScale);
-  if (scene.velocity) {
-    const BakeOptions coarse{.voxelSize = std::max(voxelSize, scene.box.longestSide() / kSlow),
-                             .box = scene.box.expanded(0.25f * scene.box.longestSide()),
-                             .background = 0.0f};
-    part.velocity =
-        threeGrids(*scene.velocity * ScalarField(float(picture.volumes.velocityScale)), coarse, run);
-    part.shutter = picture.shutter;
-  }
-  if (!picture.volumes.densityScales.empty()) part.share = float(picture.volumes.densityScales[0]);
-  check(part);
-  return combine({part}, run);
 }
 
 }  // namespace
@@ -197,21 +161,22 @@ RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options,
                 "--detail camera shows them");
   return namingFile(path, [&] {
     // What the camera frames shows only once the script has been looked at.
-    const float side = scene.box.longestSide();
+    const FieldParts& parts = scene.parts;
+    const float side = parts.box.longestSide();
     const RenderVolume coarse =
-        sampledVolume({scene.density, scene.box, {}, {}, {}, {}, {}, {}, {}}, side / kCoarse, picture, run);
+        sampledVolume({.density = parts.density, .box = parts.box}, side / kCoarse, run);
     if (coarse.isEmpty()) return coarse;
     const Camera camera = static_cast<const CameraOptions&>(picture).placed(extentOf(coarse), run).camera();
-    FieldVolumeOptions field{.box = scene.box,
+    FieldVolumeOptions field{.box = parts.box,
                              .voxelsPerPixel = isExact ? 0.5f : 1.0f,
                              .mostBytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes)};
     if (scene.hasOthers()) field.mostBytes /= 4;
-    const float voxelSize = fieldVoxelSize(scene.density, camera, field, run);
+    const float voxelSize = fieldVoxelSize(parts.density, camera, field, run);
     run.detail(
         fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path, voxelSize, side / voxelSize));
     run.stats["script"] = {{"voxel_size", voxelSize}, {"exact", isExact}};
-    return isExact ? gridlessVolume(scene.density, scene.box, voxelSize, run)
-                   : sampledVolume(scene, voxelSize, picture, run);
+    return isExact ? gridlessVolume(parts.density, parts.box, voxelSize, run)
+                   : sampledVolume(parts, voxelSize, run);
   });
 }
 
