@@ -18,6 +18,7 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
   find_package(nlohmann_json REQUIRED)
   # Debian's static one cannot be part of shared libraries, nor of modules.
   set(CGAL_Boost_USE_STATIC_LIBS OFF)
+  set(Boost_USE_STATIC_LIBS OFF)
   if(NEPHELE_WITH_CGAL)
     find_package(CGAL REQUIRED)
   endif()
@@ -31,13 +32,9 @@ if("levelset" IN_LIST NEPHELE_PARTS OR "render" IN_LIST NEPHELE_PARTS)
     find_library(FFTW_LIBRARY fftw3f REQUIRED)
   endif()
 
-  # Debian's OpenVDB installs its find module, but not on CMake's path.
-  list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
-  # It sets this variable unless CGAL was found before.
-  set(nephele_shared_libraries ${BUILD_SHARED_LIBS})
+  list(PREPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_LIST_DIR})
   find_package(OpenVDB 10 REQUIRED)
-  set(BUILD_SHARED_LIBS ${nephele_shared_libraries})
-  list(REMOVE_ITEM CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
+  list(POP_FRONT CMAKE_MODULE_PATH)
   find_path(NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h REQUIRED)
 endif()
 

@@ -127,6 +127,6 @@ VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 /// grids of points, whose values are not read, and texts over 64 MiB, which readers refuse; no partial file
 /// stays.
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
-                  const std::map<std::string, std::string>& metadata);
+                  const std::map<std::string, std::string>& metadata = {});
 
 }  // namespace nephele

@@ -1,10 +1,9 @@
 #include "nephele/modeling/base/printable.h"
 
-#include <fmt/format.h>
-
 namespace nephele {
 
 std::string printable(std::string_view text, std::size_t most) {
+  constexpr char kDigits[] = "0123456789abcdef";
   std::string result;
   for (const char c : text) {
     const auto code = static_cast<unsigned char>(c);
@@ -13,7 +12,7 @@ std::string printable(std::string_view text, std::size_t most) {
     else if (c == '\t')
       result += "\\t";
     else if (code < 0x20 || code == 0x7f)
-      result += fmt::format("\\x{:02x}", code);
+      result += {'\\', 'x', kDigits[code >> 4], kDigits[code & 15]};
     else
       result += c;
     if (result.size() > most) return result.substr(0, most - 3) + "...";
