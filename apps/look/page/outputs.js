@@ -1,0 +1,122 @@
+import { byId, make } from "./dom.js";
+import { kPage, post } from "./stream.js";
+
+/** Writes a text to the clipboard, in browsers and places that have none of the new one, too. */
+async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    const area = make("textarea", { ".value": text, style: "position:fixed;opacity:0" });
+    (document.querySelector("dialog[open]") ?? document.body).append(area);
+    area.select();
+    const isDone = document.execCommand("copy");
+    area.remove();
+    return isDone;
+  }
+}
+
+/** Hands a text to the browser as a file. */
+function download(name, text) {
+  const address = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  const link = make("a", { href: address, download: name });
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
+const kKinds = [
+  { what: "exr", title: "Picture", file: "cloud.exr", second: "1280x720", label: "Size in pixels", action: "Render" },
+  { what: "png", title: "For the screen", file: "cloud.png", second: "1280x720", label: "Size in pixels", action: "Render" },
+  { what: "vdb", title: "Volume", file: "cloud.vdb", action: "Write", needsCloud: true },
+  { what: "turntable", title: "Turntable", file: "cloud.mp4", second: "1-48", label: "Frames", action: "Render" },
+];
+const kWords = { exr: "Picture", png: "For the screen", vdb: "Volume", turntable: "Turntable", script: "Script" };
+
+/** The dialog for what comes out: command lines, recipes, and files that the program writes. */
+export class Outputs {
+  #settings;
+  #body;
+  #jobs = new Map();
+  #lines = [];
+
+  constructor(settings, body) {
+    this.#settings = settings;
+    this.#body = body;
+    byId("open-out").addEventListener("click", () => this.#open());
+    byId("out-copy").addEventListener("click", async () => this.#say((await copy(this.#lines.join("\n"))) ? "Copied." : "The browser does not allow it; select the text."));
+    byId("out-link").addEventListener("click", async () => this.#say((await copy(location.href)) ? "The link opens this look while the program runs." : "The browser does not allow it."));
+    byId("out-recipe").addEventListener("click", () => this.#recipe());
+  }
+
+  setInput({ has_cloud: hasCloud, input }) {
+    byId("out-recipe").textContent = input.kind === "script" ? "Save the script" : "Save as recipe";
+    byId("jobs-new").replaceChildren(...kKinds.filter((kind) => hasCloud || !kind.needsCloud).map((kind) => this.#new(kind)));
+  }
+
+  take({ id, what, state, fraction, stage, message }) {
+    let job = this.#jobs.get(id);
+    if (!job) {
+      const stop = make("button", { type: "button" }, "Stop");
+      stop.addEventListener("click", () => post("stop", { id }).catch(() => {}));
+      job = { bar: make("progress", { max: 1 }), stop, text: make("p"), element: null };
+      job.element = make("div", { class: "job", "data-job": id }, make("span", {}, kWords[what] ?? what), job.bar, stop, job.text);
+      this.#jobs.set(id, job);
+      byId("jobs").prepend(job.element);
+    }
+    job.element.dataset.state = state;
+    job.bar.value = state === "done" ? 1 : (fraction ?? 0);
+    job.bar.setAttribute("aria-label", `${kWords[what] ?? what}: ${state}`);
+    job.stop.hidden = state !== "running";
+    const words = { running: "", done: "Done. ", failed: "Failed. ", stopped: "Stopped. " }[state] ?? "";
+    job.text.textContent = words + (message || stage || "");
+    job.text.classList.toggle("error", state === "failed");
+  }
+
+  #say(text) {
+    byId("out-said").textContent = text;
+  }
+
+  async #open() {
+    this.#say("");
+    byId("out-error").textContent = "";
+    byId("out").showModal();
+    try {
+      const { settings, size } = this.#body();
+      this.#lines = (await post("command", { settings, size })).lines;
+      byId("out-lines").textContent = this.#lines.join("\n");
+    } catch (error) {
+      byId("out-lines").textContent = error.message;
+    }
+  }
+
+  async #recipe() {
+    try {
+      const { name, text } = await post("recipe", { settings: this.#settings.copy() });
+      download(name, text);
+      this.#say(`${name} is saved by the browser.`);
+    } catch (error) {
+      byId("out-error").textContent = error.message;
+    }
+  }
+
+  #new(kind) {
+    const file = make("input", { value: kind.file, "aria-label": `${kind.title}: file`, autocomplete: "off", spellcheck: "false" });
+    const second = kind.second ? make("input", { value: kind.second, "aria-label": `${kind.title}: ${kind.label}`, title: kind.label, autocomplete: "off" }) : make("span");
+    const start = make("button", { type: "button", "data-job-of": kind.what }, kind.action);
+    start.addEventListener("click", async () => {
+      byId("out-error").textContent = "";
+      const { settings, size } = this.#body();
+      const typed = /^(\d+)x(\d+)$/.exec(second.value ?? "");
+      const body = { page: kPage, what: kind.what, file: file.value.trim(), settings, size: typed ? [Number(typed[1]), Number(typed[2])] : size };
+      if (kind.what === "turntable") body.frames = second.value.trim();
+      try {
+        await post("job", body);
+      } catch (error) {
+        byId("out-error").textContent = error.message;
+      }
+    });
+    return make("div", { class: "new" }, make("span", {}, kind.title), file, second, start);
+  }
+}

@@ -1,0 +1,66 @@
+const clone = (value) => JSON.parse(JSON.stringify(value));
+const whole = (settings) => ({ cloud: {}, render: {}, parameters: {}, ...clone(settings ?? {}) });
+
+/**
+ * What is looked at: settings of the verbs and what of the picture is shown. "change" is sent for each change, with `hurry` while
+ * something is dragged.
+ */
+export class Settings extends EventTarget {
+  values = whole({});
+  show = { what: "cloud", layer: "beauty", false_color: false };
+  /** verb -> name -> control */
+  table = { cloud: {}, render: {}, parameters: {} };
+
+  get(verb, name) {
+    return this.values[verb][name];
+  }
+
+  /** Sets values, of which undefined is the default; those that exclude them go. */
+  set(verb, values, hurry = false) {
+    const own = this.values[verb];
+    for (const [name, value] of Object.entries(values)) {
+      if (value === undefined || value === "" || (Array.isArray(value) && value.length === 0)) {
+        delete own[name];
+        continue;
+      }
+      own[name] = value;
+      for (const other of this.table[verb][name]?.excludes ?? []) delete own[other];
+    }
+    this.#changed(hurry);
+  }
+
+  replace(values, hurry = false) {
+    this.values = whole(values);
+    this.#changed(hurry);
+  }
+
+  setShow(values) {
+    Object.assign(this.show, values);
+    this.#changed(false);
+  }
+
+  copy() {
+    return clone(this.values);
+  }
+
+  #changed(hurry) {
+    this.dispatchEvent(new CustomEvent("change", { detail: { hurry } }));
+  }
+}
+
+/** Settings as the part of an address after #. */
+export function toFragment(state) {
+  const bytes = new TextEncoder().encode(JSON.stringify(state));
+  return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+}
+
+/** The opposite; null where it is none. */
+export function fromFragment(fragment) {
+  try {
+    const text = atob(fragment.replace(/^#/, "").replaceAll("-", "+").replaceAll("_", "/"));
+    const state = JSON.parse(new TextDecoder().decode(Uint8Array.from(text, (c) => c.charCodeAt(0))));
+    return state && typeof state === "object" && state.settings ? state : null;
+  } catch {
+    return null;
+  }
+}
