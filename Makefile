@@ -13,7 +13,7 @@ STRICT := OFF
 SECONDS := 60
 FORMATS :=
 
-.PHONY: all deps build demo examples test test-sanitized fuzz test-farm bench docs format lint install clean
+.PHONY: all deps build demo examples test test-sanitized fuzz test-farm bench docs format lint install package clean
 
 all: build
 
@@ -80,6 +80,13 @@ lint:
 # Libraries, headers, CMake package and program, e.g. make install PREFIX=$$HOME/nephele
 install: build
 	cmake --install build --prefix $(PREFIX)
+
+# Debian packages of the program, the libraries and the module for Python, in build/package.
+package: build
+	cmake build -DCMAKE_INSTALL_LIBDIR=lib/$(shell gcc -print-multiarch) -DNEPHELE_PYTHON_DIR=lib/python3/dist-packages
+	cmake --build build
+	cd build && cpack -B package
+	cmake build -UCMAKE_INSTALL_LIBDIR -UNEPHELE_PYTHON_DIR
 
 clean:
 	rm -rf examples build build-debug build-asan build-fuzz build-tsan bench-results

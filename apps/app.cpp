@@ -12,6 +12,7 @@
 #include "apps/detail/call_sheet.h"
 #include "apps/detail/command.h"
 #include "apps/detail/several_calls.h"
+#include "apps/manual/man_page.h"
 #include "apps/options/config_file.h"
 #include "apps/options/first_day.h"
 #include "apps/options/old_names.h"
@@ -271,10 +272,21 @@ int unknownVerb(const std::string& word, const std::vector<Verb>& verbs) {
                                            meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
 }
 
+/// A man page, or what a shell completes by.
+int printManual(const std::string& kind, const std::string& name) try {
+  std::cout << (kind == "--man" ? manPage(name) : completionsFor(name));
+  return 0;
+} catch (const Error& error) {
+  return usageError("nephele", error.what());
+}
+
 std::string overview(const std::vector<Verb>& verbs) {
   std::string text = "Nephele: clouds and level sets.\nUsage: nephele VERB [OPTIONS]\n\nVerbs:\n";
   for (const Verb& verb : verbs) text += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
-  return text + "\n'nephele help VERB' explains a verb; 'nephele --version' prints the version.\n";
+  return text +
+         "\n'nephele help VERB' explains a verb; 'nephele --version' prints the version.\n"
+         "'nephele help --man VERB' is its man page; 'nephele help --completion bash|zsh|fish' completes "
+         "words.\n";
 }
 
 }  // namespace
@@ -305,6 +317,7 @@ int runProgram(int argc, char** argv, const std::vector<Verb>& verbs) {
   const std::string word = argc > 1 ? argv[1] : "--help";
   if (word == "help" && argc > 2) {
     const std::string asked = argv[2];
+    if (asked == "--man" || asked == "--completion") return printManual(asked, argc > 3 ? argv[3] : "");
     for (const Verb& verb : verbs)
       if (verb.name == asked) return runVerb(verb, verbs, {"--help"}, commandLineOf(argc, argv));
     return unknownVerb(asked, verbs);

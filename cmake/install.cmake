@@ -26,6 +26,17 @@ include(pkg_config)
 
 if(NEPHELE_BUILD_APPS)
   install(TARGETS nephele RUNTIME COMPONENT program)
+  if(TARGET nephele_manual)
+    set(manual ${PROJECT_BINARY_DIR}/apps/manual)
+    install(DIRECTORY ${manual}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
+      FILES_MATCHING PATTERN "*.1.gz")
+    install(FILES ${manual}/nephele.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME nephele
+      COMPONENT program)
+    install(FILES ${manual}/nephele.zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions RENAME _nephele
+      COMPONENT program)
+    install(FILES ${manual}/nephele.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
+      COMPONENT program)
+  endif()
 endif()
 if(TARGET nephele_python)
   # Where Debian's Python looks in /usr/local.

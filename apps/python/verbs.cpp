@@ -2,9 +2,8 @@
 // would.
 #include <pybind11/stl.h>
 
-#include "apps/detail/command.h"
 #include "apps/detail/program_run.h"
-#include "apps/options/common_group.h"
+#include "apps/manual/option_table.h"
 #include "apps/options/descriptions.h"
 #include "apps/python/values.h"
 #include "apps/python/watch.h"
@@ -78,34 +77,18 @@ py::object callVerb(const std::string& verb, const std::vector<std::string>& arg
   return toPython(statistics);
 }
 
-void addOptionsOf(const CLI::App& app, py::list& all) {
-  for (const CLI::Option* option : app.get_options()) {
-    const bool isPositional = option->get_positional();
-    const std::vector<std::string>& names = option->get_lnames();
-    const std::string name = isPositional    ? option->get_name(true, false)
-                             : names.empty() ? ""
-                                             : names.front();
-    if (name.empty() || name.starts_with("help")) continue;
-    all.append(py::dict("name"_a = name, "positional"_a = isPositional, "type"_a = option->get_type_name(),
-                        "default"_a = option->get_default_str(), "help"_a = option->get_description(),
-                        "group"_a = option->get_group(), "is_flag"_a = option->get_items_expected_max() == 0,
-                        "repeats"_a = option->get_items_expected_max() > 1,
-                        "is_output"_a = apps::isOutput(*option), "required"_a = option->get_required()));
-  }
-  for (const CLI::App* group :
-       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
-    addOptionsOf(*group, all);
-}
-
 /// The options of a verb, from the table that --help is made from.
 py::dict optionsOf(const std::string& name) {
-  for (const apps::Verb& verb : apps::allVerbs())
-    if (verb.name == name) {
-      const apps::Command command(verb);
-      py::list options;
-      addOptionsOf(command.app, options);
-      return py::dict("summary"_a = verb.summary, "example"_a = verb.example, "options"_a = options);
-    }
+  for (const apps::Verb& verb : apps::allVerbs()) {
+    if (verb.name != name) continue;
+    py::list options;
+    for (const apps::OptionRow& row : apps::optionTable(verb))
+      options.append(py::dict("name"_a = row.name, "type"_a = row.type, "default"_a = row.standard,
+                              "help"_a = row.help, "group"_a = row.group, "is_input"_a = row.isInput,
+                              "is_flag"_a = row.isFlag, "is_output"_a = row.isOutput,
+                              "repeats"_a = row.repeats));
+    return py::dict("summary"_a = verb.summary, "example"_a = verb.example, "options"_a = options);
+  }
   throw py::value_error("there is no verb '" + name + "'");
 }
 

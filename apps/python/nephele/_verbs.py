@@ -21,7 +21,7 @@ def options(verb):
     """The options of a verb, as --help has them: a dict by name of dicts with type, default, help and group."""
     table = {}
     for option in _nephele._options(verb)["options"]:
-        if not option["positional"]:
+        if not option["is_input"]:
             table[option["name"].replace("-", "_")] = option
     return table
 
