@@ -9,7 +9,7 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXE
   WORLD_EXECUTE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_HOMEPAGE "")
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # Of the libraries of this package.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/modeling ${PROJECT_BINARY_DIR}/levelset
@@ -28,11 +28,18 @@ function(nephele_package component name)
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${arg_TEXT}" PARENT_SCOPE)
   install(FILES ${PROJECT_SOURCE_DIR}/cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name}
     RENAME copyright COMPONENT ${component})
-  install(FILES ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
+  install(FILES ${PROJECT_BINARY_DIR}/changelog.gz ${PROJECT_BINARY_DIR}/changelog.Debian.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
 endfunction()
 
 file(COPY_FILE ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_BINARY_DIR}/changelog ONLY_IF_DIFFERENT)
-execute_process(COMMAND gzip -9nkf ${PROJECT_BINARY_DIR}/changelog)
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+file(WRITE ${PROJECT_BINARY_DIR}/changelog.Debian "nephele (${PROJECT_VERSION}-1) bookworm; urgency=medium
+
+  * Built from its sources; changelog.gz says what has changed.
+
+ -- ${NEPHELE_MAINTAINER}  ${date}
+")
+execute_process(COMMAND gzip -9nkf ${PROJECT_BINARY_DIR}/changelog ${PROJECT_BINARY_DIR}/changelog.Debian)
 
 set(development libblosc-dev libboost-iostreams-dev libceres-dev libfmt-dev libhwy-dev libimath-dev libkissfft-dev
   libnanovdb-dev libopenexr-dev libopenmesh-dev libopenvdb-dev libpng-dev libsuitesparse-dev libtbb-dev nlohmann-json3-dev
@@ -47,7 +54,7 @@ foreach(with IN ITEMS CGAL:libcgal-dev EMBREE:libembree-dev FFTW:libfftw3-dev OC
 endforeach()
 if(BUILD_SHARED_LIBS)
   set(shared libnephele${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
-  list(PREPEND development "${shared} (= ${PROJECT_VERSION})")
+  list(PREPEND development "${shared} (= ${PROJECT_VERSION}-1)")
   nephele_package(libraries ${shared} SECTION libs TEXT "Clouds and level sets, shared libraries\n Fields, level sets, clouds and their light.")
 endif()
 list(JOIN development ", " development)
@@ -55,14 +62,14 @@ nephele_package(dev libnephele-dev SECTION libdevel DEPENDS "${development}"
   TEXT "Clouds and level sets, development files\n Libraries, headers, and what CMake and pkg-config need to find them.")
 if(NEPHELE_BUILD_APPS)
   nephele_package(program nephele SECTION graphics TEXT
-    "Turns meshes into clouds and level sets\n Level sets, layers of pyroclastic displacement, precomputed light and pictures.\n Cuts models into pieces and carries textures from one to another.")
+    "Turns meshes into clouds and level sets\n Level sets, layers of pyroclastic displacement, precomputed light and\n pictures. Cuts models into pieces and carries textures from one to another.")
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS ffmpeg)
 endif()
 if(TARGET nephele_python)
   math(EXPR next "${Python_VERSION_MINOR} + 1")
   nephele_package(python python3-nephele SECTION python
     DEPENDS "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy"
-    TEXT "Clouds and level sets, module for Python\n Fields, meshes, grids and pictures with numpy's arrays, and what the program does.")
+    TEXT "Clouds and level sets, module for Python\n Fields, meshes, grids and pictures with numpy's arrays, and what the\n program does.")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-tqdm")
 endif()
 include(CPack)
