@@ -59,7 +59,7 @@ export class Controls {
     return errors.filter(({ verb, option, message }) => {
       const control = this.#all.find((one) => one.control.name === option && (!verb || one.control.verb === verb));
       if (!control) return true;
-      control.setError(message);
+      control.setError(message.split("\n")[0]);
       const group = control.element.closest("details");
       group.open = true;
       return false;
@@ -91,6 +91,7 @@ export class Controls {
       }
     }
     byId("none").hidden = found > 0;
+    byId("light").hidden = words.length > 0;
   }
 }
 
@@ -104,6 +105,7 @@ class Control {
   #value;
   #parts = {};
   #ramp = null;
+  #written = "";
 
   constructor(control, settings, commit) {
     this.control = control;
@@ -137,8 +139,9 @@ class Control {
     this.element.title = isOff ? `Needs ${control.needs.map(labelOf).join(", ")}` : "";
     const { text, range, color, box, choice, lines, curve } = this.#parts;
     const shown = given ?? this.#standard();
-    if (text && document.activeElement !== text) {
-      text.value = String(shown);
+    // Not under the hand of somebody who types.
+    if (text && (document.activeElement !== text || text.value === this.#written)) {
+      text.value = this.#written = String(shown);
       text.title = String(shown).length > 8 ? String(shown) : "";
     }
     if (lines && document.activeElement !== lines) lines.value = (Array.isArray(given) ? given : given ? [given] : []).join("\n");

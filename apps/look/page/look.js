@@ -31,6 +31,7 @@ startTheme(() => picture.draw());
 
 let isLoaded = false;
 let fragment = "";
+let settled = 0;
 
 function sizeOfPicture() {
   const chosen = /^(\d+)x(\d+)$/.exec(byId("size").value);
@@ -61,6 +62,18 @@ function announce(text) {
   byId("said").textContent = text;
 }
 
+function ask(hurry) {
+  byId("stage").setAttribute("aria-busy", "true");
+  sender.ask(hurry);
+}
+
+/** Nothing more comes for the settings of the last request; its own answer may come later. */
+function settle() {
+  progress(null);
+  settled = sender.revision;
+  if (!sender.isBehind) byId("stage").setAttribute("aria-busy", "false");
+}
+
 function progress(fraction) {
   byId("progress").hidden = fraction === null;
   byId("progress").firstElementChild.style.width = `${Math.round((fraction ?? 0) * 100)}%`;
@@ -70,7 +83,10 @@ const seconds = (value) => (value < 1 ? `${Math.round(value * 1000)} ms` : `${va
 
 function facts(message) {
   const parts = [`${message.width} × ${message.height}`];
-  if (message.rays_per_pixel) parts.push(`${Number(message.rays_per_pixel.toPrecision(3))} rays per pixel`);
+  if (message.rays_per_pixel) {
+    const rays = Number(message.rays_per_pixel.toPrecision(3));
+    parts.push(`${rays} ${rays === 1 ? "ray" : "rays"} per pixel`);
+  }
   if (message.voxels) parts.push(`${Math.round(message.voxels)} voxels`);
   parts.push(seconds(message.milliseconds / 1000));
   byId("facts").textContent = parts.join("   ·   ");
@@ -92,15 +108,14 @@ function take({ message, payload }) {
     case "idle":
       if (!isCurrent()) break;
       sender.seen(message.revision);
-      progress(null);
+      settle();
       byId("stage-text").textContent = `Finished in ${seconds(message.seconds)}`;
-      document.body.dataset.idle = message.revision;
       if (!camera.isDragging) announce(`Picture finished in ${seconds(message.seconds)}.`);
       break;
     case "error":
       if (!isCurrent()) break;
       sender.seen(message.revision);
-      progress(null);
+      settle();
       byId("stage-text").textContent = "Not made";
       showErrors([{ verb: message.verb, option: message.option, message: message.message, text: message.text }]);
       break;
@@ -121,11 +136,13 @@ function take({ message, payload }) {
 }
 
 async function takePicture(message, payload) {
-  const isShown = await picture.take(message, payload, () => sender.isCurrent(message.revision));
+  const isDragged = sender.isHurried;
+  // The next one is made while this one is decoded.
+  if (isDragged) sender.seen(message.revision);
+  const isShown = await picture.take(message, payload, () => sender.isCurrent(message.revision) || (isDragged && sender.isHurried));
   sender.seen(message.revision);
   if (!isShown) return;
-  document.body.dataset.revision = message.revision;
-  document.body.dataset.level = message.level;
+  byId("picture").dataset.revision = message.revision;
   facts(message);
   byId("stage-text").textContent = message.final ? "Final" : labelOf(message.stage);
   dome.update(message.camera);
@@ -182,16 +199,16 @@ function keepInAddress() {
 settings.addEventListener("change", ({ detail }) => {
   update();
   if (!isLoaded) return;
-  sender.ask(detail.hurry);
+  ask(detail.hurry);
   keepInAddress();
 });
 
-sender.addEventListener("taken", ({ detail }) => {
+sender.addEventListener("taken", () => {
   showErrors([]);
-  document.body.dataset.taken = detail.revision;
+  if (settled === sender.revision) settle();
 });
 sender.addEventListener("refused", ({ detail }) => {
-  progress(null);
+  settle();
   showErrors(detail.errors.length ? detail.errors : [{ message: detail.message }]);
 });
 
@@ -297,7 +314,7 @@ new ResizeObserver(() => {
   clearTimeout(sizeTimer);
   sizeTimer = setTimeout(() => {
     const size = sizeOfPicture().join("x");
-    if (isLoaded && size !== lastSize) sender.ask(false);
+    if (isLoaded && size !== lastSize) ask(false);
     lastSize = size;
   }, 200);
 }).observe(byId("stage"));
@@ -334,14 +351,14 @@ async function load(isAgain = false) {
   for (const what of ["surface", "checker"]) byId("what").querySelector(`[value=${what}]`).disabled = what === "checker" && given.input.kind !== "mesh";
   if (isLoaded) {
     if (isAgain) dropGoneParameters(given.parameters);
-    sender.ask(false);
+    ask(false);
     return;
   }
   adopt(fromFragment(location.hash) ?? { settings: given.settings });
   history_.begin(settings.copy());
   isLoaded = true;
   lastSize = sizeOfPicture().join("x");
-  sender.ask(false);
+  ask(false);
 }
 
 /** A script that was saved without them would refuse them. */

@@ -27,12 +27,12 @@ function download(name, text) {
 }
 
 const kKinds = [
-  { what: "exr", title: "Picture", file: "cloud.exr", second: "1280x720", label: "Size in pixels", action: "Render" },
-  { what: "png", title: "For the screen", file: "cloud.png", second: "1280x720", label: "Size in pixels", action: "Render" },
+  { what: "exr", title: "EXR picture", file: "cloud.exr", second: "1280x720", label: "Size in pixels", action: "Render" },
+  { what: "png", title: "PNG preview", file: "cloud.png", second: "1280x720", label: "Size in pixels", action: "Render" },
   { what: "vdb", title: "Volume", file: "cloud.vdb", action: "Write", needsCloud: true },
   { what: "turntable", title: "Turntable", file: "cloud.mp4", second: "1-48", label: "Frames", action: "Render" },
 ];
-const kWords = { exr: "Picture", png: "For the screen", vdb: "Volume", turntable: "Turntable", script: "Script" };
+const kWords = { exr: "EXR picture", png: "PNG preview", vdb: "Volume", turntable: "Turntable", script: "Script" };
 
 /** The dialog for what comes out: command lines, recipes, and files that the program writes. */
 export class Outputs {
@@ -84,6 +84,8 @@ export class Outputs {
     byId("out").showModal();
     try {
       const { settings, size } = this.#body();
+      // The same frame as the one that is seen.
+      for (const input of document.querySelectorAll("#jobs-new [data-size]")) input.value = size[0] > 640 ? size.join("x") : `1280x${2 * Math.round((640 * size[1]) / size[0])}`;
       this.#lines = (await post("command", { settings, size })).lines;
       byId("out-lines").textContent = this.#lines.join("\n");
     } catch (error) {
@@ -103,7 +105,7 @@ export class Outputs {
 
   #new(kind) {
     const file = make("input", { value: kind.file, "aria-label": `${kind.title}: file`, autocomplete: "off", spellcheck: "false" });
-    const second = kind.second ? make("input", { value: kind.second, "aria-label": `${kind.title}: ${kind.label}`, title: kind.label, autocomplete: "off" }) : make("span");
+    const second = kind.second ? make("input", { value: kind.second, "aria-label": `${kind.title}: ${kind.label}`, title: kind.label, autocomplete: "off", "data-size": kind.what !== "turntable" }) : make("span");
     const start = make("button", { type: "button", "data-job-of": kind.what }, kind.action);
     start.addEventListener("click", async () => {
       byId("out-error").textContent = "";

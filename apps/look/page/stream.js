@@ -108,6 +108,7 @@ export class Sender extends EventTarget {
   #good = 0;
   #held = [];
   #last = 0;
+  #isHurried = false;
   revision = 0;
 
   constructor(makeBody) {
@@ -123,6 +124,11 @@ export class Sender extends EventTarget {
   /** Whether something newer waits or is on its way. */
   get isBehind() {
     return this.#wanted !== null || this.#isSending;
+  }
+
+  /** Whether the last settings were sent while something was dragged. */
+  get isHurried() {
+    return this.#isHurried;
   }
 
   /** True for a message about the settings as they are; of one that may become it again, when new ones are refused, a later call is made. */
@@ -150,6 +156,7 @@ export class Sender extends EventTarget {
     }
     this.#wanted = null;
     this.#isSending = true;
+    this.#isHurried = hurry;
     this.revision = ++this.#last;
     this.#held = [];
     this.#shownBy = performance.now() + kLongestWait;
