@@ -3,6 +3,7 @@
 PACKAGES := $(shell cat cmake/packages.txt)
 FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
 LINT_PACKAGES := clang-format
+DOCS_PACKAGES := doxygen
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
@@ -65,8 +66,14 @@ bench: deps
 	cmake --build build
 	python3 tests/bench/run.py build bench-results
 
+# Help texts in the pages, the stubs of the module for Python, and the reference of the headers in build/reference.
 docs: build
 	sh docs/update_help.sh $(CURDIR)/build/bin/nephele
+	PYTHONPATH=build/python /usr/bin/python3 apps/python/make_stubs.py
+	@dpkg -s $(DOCS_PACKAGES) >/dev/null 2>&1 || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(DOCS_PACKAGES)
+	mkdir -p build/reference
+	doxygen docs/Doxyfile
 
 format:
 	clang-format -i $$(git ls-files '*.h' '*.cpp')

@@ -8,6 +8,7 @@
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/system.h"
 
 namespace nephele::python {
 namespace {
@@ -16,7 +17,7 @@ using pybind11::literals::operator""_a;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// Points that a thread evaluates at a time, and those from which on interrupts are looked for.
-constexpr std::size_t kPiece = 4096, kMany = 100'000;
+constexpr std::size_t kPiece = 2048, kMany = 100'000;
 
 /// Points as rows of three floats, at any strides.
 struct Points {
@@ -39,6 +40,28 @@ Points pointsFrom(const py::object& object) {
   return points;
 }
 
+/// Points of an array as three lanes. Those of a plain array are gathered several at a time.
+void gather(const char* from, py::ssize_t row, py::ssize_t column, std::size_t count, float* x, float* y,
+            float* z) {
+  const bool isPlain = row == 3 * sizeof(float) && column == sizeof(float) &&
+                       reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0;
+  if (isPlain) {
+    const float* p = reinterpret_cast<const float*>(from);
+    for (std::size_t i = 0; i < count; ++i) {
+      x[i] = p[3 * i];
+      y[i] = p[3 * i + 1];
+      z[i] = p[3 * i + 2];
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < count; ++i, from += row) {
+    // Arrays need not be aligned.
+    std::memcpy(x + i, from, sizeof(float));
+    std::memcpy(y + i, from + column, sizeof(float));
+    std::memcpy(z + i, from + 2 * column, sizeof(float));
+  }
+}
+
 /// body(first, count, x y z) for pieces of the points, on all threads.
 template <class Body>
 void forPieces(const Points& points, Watch& watch, const Body& body) {
@@ -49,15 +72,9 @@ void forPieces(const Points& points, Watch& watch, const Body& body) {
         points.count, kPiece,
         [&](std::size_t begin, std::size_t end) {
           const std::size_t count = end - begin;
-          std::vector<float> xyz(3 * count);
-          for (std::size_t i = 0; i < count; ++i)
-            for (std::size_t c = 0; c < 3; ++c)
-              // Arrays need not be aligned.
-              std::memcpy(&xyz[c * count + i], data + py::ssize_t(begin + i) * row + py::ssize_t(c) * column,
-                          sizeof(float));
-          const std::span<const float> all(xyz);
-          body(begin, count,
-               PointSpans{all.subspan(0, count), all.subspan(count, count), all.subspan(2 * count, count)});
+          float x[kPiece], y[kPiece], z[kPiece];
+          gather(data + py::ssize_t(begin) * row, row, column, count, x, y, z);
+          body(begin, count, PointSpans{{x, count}, {y, count}, {z, count}});
         },
         watch);
   };
@@ -65,6 +82,13 @@ void forPieces(const Points& points, Watch& watch, const Body& body) {
     atOnce(watch, work);
   else
     watched(watch, py::none(), work);
+}
+
+/// Room for values that threads will write first.
+py::array_t<float> newArray(const std::vector<py::ssize_t>& shape) {
+  py::array_t<float> array(shape);
+  detail::adviseHugePages(array.mutable_data(), array.mutable_data() + array.size());
+  return array;
 }
 
 /// Spans of `count` floats each, one after the other in `buffer`.
@@ -110,7 +134,7 @@ template <class T>
 py::object valuesAt(const PythonField<T>& self, const py::object& object) {
   constexpr int kLanes = kComponents<T>;
   const Points points = pointsFrom(object);
-  py::array_t<float> values(shapeOfValues<T>(points));
+  py::array_t<float> values = newArray(shapeOfValues<T>(points));
   float* to = values.mutable_data();
   const Field<T> field = self.field();
   Watch watch;
@@ -130,7 +154,8 @@ template <class T>
 py::tuple valuesAndGradientsAt(const PythonField<T>& self, const py::object& object) {
   constexpr int kLanes = kComponents<T>;
   const Points points = pointsFrom(object);
-  py::array_t<float> values(shapeOfValues<T>(points)), gradients(joined(shapeOfValues<T>(points), {3}));
+  py::array_t<float> values = newArray(shapeOfValues<T>(points));
+  py::array_t<float> gradients = newArray(joined(shapeOfValues<T>(points), {3}));
   float *to = values.mutable_data(), *gradientsTo = gradients.mutable_data();
   const Field<T> field = self.field();
   Watch watch;

@@ -10,8 +10,8 @@ PYBIND11_MODULE(_nephele, module) {
   py::register_exception<nephele::Error>(module, "Error");
   py::register_exception<nephele::Cancelled>(module, "Cancelled", module.attr("Error"));
   module.attr("__version__") = NEPHELE_VERSION;
-  addMeshes(module);
   addPictures(module);
+  addMeshes(module);
   addGrids(module);
   addFields(module);
   addWords(module);

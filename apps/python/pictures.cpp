@@ -23,17 +23,10 @@ py::array_t<float> interleaved(const Image& image, const std::vector<const Image
   return array;
 }
 
-/// R, G, B and A; opaque where there is no A, grey where there is only Y.
 py::array_t<float> colours(const Self& self) {
   const Image& image = self->image;
-  const Image::Channel* grey = image.find("Y");
-  const auto colour = [&](const char* name) {
-    return image.find(name) || !grey ? &image.channel(name) : grey;
-  };
-  Image::Channel opaque{"A", false, {}};
-  const Image::Channel* alpha = image.find("A");
-  if (!alpha) opaque.values.assign(std::size_t(image.width) * std::size_t(image.height), 1.0f);
-  return interleaved(image, {colour("R"), colour("G"), colour("B"), alpha ? alpha : &opaque});
+  return interleaved(image,
+                     {&image.channel("R"), &image.channel("G"), &image.channel("B"), &image.channel("A")});
 }
 
 /// All channels but the four, by the name before the point: (height, width), or (height, width, n) of
@@ -56,17 +49,22 @@ py::dict layersOf(const Self& self) {
   return all;
 }
 
-ViewTransform viewOfName(const std::string& name, double exposure) {
+/// Behind what is not opaque: a clear sky.
+constexpr std::array<float, 3> kSky{0.1f, 0.17f, 0.28f};
+
+ViewTransform viewOfName(const std::string& name, double exposure, const std::array<float, 3>& behind) {
+  const Vec3f background{behind[0], behind[1], behind[2]};
   for (const ViewCurve curve : {ViewCurve::standard, ViewCurve::filmic, ViewCurve::agx, ViewCurve::raw}) {
-    const ViewTransform view{.exposureStops = float(exposure), .curve = curve};
+    const ViewTransform view{.exposureStops = float(exposure), .background = background, .curve = curve};
     if (view.name() == name) return view;
   }
   throw py::value_error("view must be standard, filmic, agx or raw, got '" + name + "'");
 }
 
-py::array screenOf(const Self& self, const std::string& view, double exposure) {
-  const auto bytes =
-      std::make_shared<const std::vector<std::uint8_t>>(screenBytes(self->image, viewOfName(view, exposure)));
+py::array screenOf(const Self& self, const std::string& view, double exposure,
+                   const std::array<float, 3>& background) {
+  const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(
+      screenBytes(self->image, viewOfName(view, exposure, background)));
   const py::ssize_t width = self->image.width;
   return viewOf(bytes->data(), {self->image.height, width, 3}, {3 * width, 3, 1}, bytes);
 }
@@ -109,9 +107,10 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
   return content;
 }
 
-void save(const Self& self, const std::string& path, const std::string& view, double exposure) {
+void save(const Self& self, const std::string& path, const std::string& view, double exposure,
+          const std::array<float, 3>& background) {
   Watch watch;
-  const ViewTransform transform = viewOfName(view, exposure);
+  const ViewTransform transform = viewOfName(view, exposure, background);
   const bool isScreen = path.ends_with(".png") || path.ends_with(".PNG");
   if (!isScreen && !path.ends_with(".exr") && !path.ends_with(".EXR"))
     throw Error(path + ": unknown picture format; .exr and .png can be written");
@@ -121,6 +120,19 @@ void save(const Self& self, const std::string& path, const std::string& view, do
     else
       writeExr(path, self->image, self->camera, self->metadata);
   });
+}
+
+/// R, G, B and A of grey and of opaque pictures, too.
+void complete(Image& image) {
+  const auto copy = [&](const char* name, std::vector<float> values) {
+    if (!image.find(name)) image.add(name).values = std::move(values);
+  };
+  if (const Image::Channel* grey = image.find("Y")) {
+    const std::vector<float> values = grey->values;
+    for (const char* name : {"R", "G", "B"}) copy(name, values);
+  }
+  if (image.find("R"))
+    copy("A", std::vector<float>(std::size_t(image.width) * std::size_t(image.height), 1.0f));
 }
 
 }  // namespace
@@ -139,10 +151,11 @@ void addPictures(py::module_& module) {
           "height", [](const Self& s) { return s->image.height; }, "Rows.")
       .def_property_readonly(
           "metadata", [](const Self& s) { return s->metadata; }, "Text that files carry.")
-      .def("screen", screenOf, "view"_a = "filmic", "exposure"_a = 0.0,
-           "The picture for the screen, (height, width, 3) bytes. Views are those of --view-transform.")
+      .def("screen", screenOf, "view"_a = "filmic", "exposure"_a = 0.0, "background"_a = kSky,
+           "The picture for the screen, (height, width, 3) bytes. Views are those of --view-transform; "
+           "background is linear light behind what is not opaque.")
       .def("save", save, "path"_a, py::kw_only(), "view"_a = "filmic", "exposure"_a = 0.0,
-           "Writes .exr (linear, all layers) or .png (for the screen).")
+           "background"_a = kSky, "Writes .exr (linear, all layers) or .png (for the screen).")
       .def("__repr__", [](const Self& s) {
         return "<nephele.Picture of " + std::to_string(s->image.width) + " x " +
                std::to_string(s->image.height) + ">";
@@ -150,7 +163,10 @@ void addPictures(py::module_& module) {
   module.def("_read_picture", [](const std::string& path) {
     auto content = std::make_shared<ExrContent>();
     Watch watch;
-    watched(watch, py::none(), [&] { content->image = readLinearImage(path); });
+    watched(watch, py::none(), [&] {
+      content->image = readLinearImage(path);
+      complete(content->image);
+    });
     return content;
   });
 }

@@ -223,8 +223,8 @@ def advect(what, /, *arguments, **named):
     return _made("advect", [(what, "grid")], ".vdb", named, name="grids")
 
 
-def wisps(points, /, **named):
-    return _made("wisps", [(points, "points")], ".vdb", named, name="density")
+def wisps(source, /, **named):
+    return _made("wisps", [(source, "points")], ".vdb", named, name="density")
 
 
 def mesh(what, /, **named):

@@ -7,7 +7,7 @@ from . import _nephele
 
 # What Python has itself, and what only a script needs.
 _LEFT_OUT = {
-    "cacheread", "cachewrite", "cut", "error", "eval", "float", "int", "matrix", "matrixcache", "print", "read",
+    "cacheread", "cachewrite", "error", "eval", "float", "int", "matrix", "matrixcache", "print", "read",
     "readfield", "readvectorfield", "scalarcache", "size", "string", "vector", "vectorcache", "write",
 }
 
@@ -16,7 +16,9 @@ def overloads():
     """The words that Python has, by name: a list of what each of the functions of that name is."""
     found = {}
     for word in _nephele._words():
-        if word["name"] not in _LEFT_OUT:
+        name = word["name"]
+        # Verbs that have the name of a word take its place; advect is both.
+        if name not in _LEFT_OUT and (name == "advect" or name not in _nephele._verbs()):
             found.setdefault(word["name"], []).append(word)
     return found
 
