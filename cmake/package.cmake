@@ -11,6 +11,7 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ${BUILD_SHARED_LIBS})
 # Of the libraries of this package.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/modeling ${PROJECT_BINARY_DIR}/levelset
   ${PROJECT_BINARY_DIR}/render)
@@ -52,23 +53,29 @@ foreach(with IN ITEMS CGAL:libcgal-dev EMBREE:libembree-dev FFTW:libfftw3-dev OC
     list(REMOVE_ITEM development ${option})
   endif()
 endforeach()
+set(libraries "")
 if(BUILD_SHARED_LIBS)
   set(shared libnephele${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
-  list(PREPEND development "${shared} (= ${PROJECT_VERSION}-1)")
+  set(libraries "${shared} (= ${PROJECT_VERSION}-1)")
+  list(PREPEND development ${libraries})
+  file(WRITE ${PROJECT_BINARY_DIR}/triggers "activate-noawait ldconfig\n")
+  set(CPACK_DEBIAN_LIBRARIES_PACKAGE_CONTROL_EXTRA ${PROJECT_BINARY_DIR}/triggers)
   nephele_package(libraries ${shared} SECTION libs TEXT "Clouds and level sets, shared libraries\n Fields, level sets, clouds and their light.")
 endif()
 list(JOIN development ", " development)
 nephele_package(dev libnephele-dev SECTION libdevel DEPENDS "${development}"
   TEXT "Clouds and level sets, development files\n Libraries, headers, and what CMake and pkg-config need to find them.")
 if(NEPHELE_BUILD_APPS)
-  nephele_package(program nephele SECTION graphics TEXT
+  nephele_package(program nephele SECTION graphics DEPENDS "${libraries}" TEXT
     "Turns meshes into clouds and level sets\n Level sets, layers of pyroclastic displacement, precomputed light and\n pictures. Cuts models into pieces and carries textures from one to another.")
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS ffmpeg)
 endif()
 if(TARGET nephele_python)
   math(EXPR next "${Python_VERSION_MINOR} + 1")
+  set(python "python3 (>= 3.${Python_VERSION_MINOR})" "python3 (<< 3.${next})" python3-numpy ${libraries})
+  list(JOIN python ", " python)
   nephele_package(python python3-nephele SECTION python
-    DEPENDS "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy"
+    DEPENDS "${python}"
     TEXT "Clouds and level sets, module for Python\n Fields, meshes, grids and pictures with numpy's arrays, and what the\n program does.")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-tqdm")
 endif()
