@@ -125,7 +125,8 @@ constexpr py::ssize_t bytes(std::size_t count) {
 
 py::array positionsOf(const std::shared_ptr<felt::Shape>& self) {
   const auto& p = self->mesh.positions;
-  return viewOf(&p.data()->x, {bytes(p.size()), 3}, {sizeof(Vec3d), sizeof(double)}, self);
+  return viewOf(reinterpret_cast<const double*>(p.data()), {bytes(p.size()), 3},
+                {sizeof(Vec3d), sizeof(double)}, self);
 }
 
 /// Corners of every face, where all have as many; else 0.
