@@ -222,10 +222,16 @@ py::array toArray(const Self& self,
   return array;
 }
 
-std::shared_ptr<const BrickGrid> onlyBricks(const Self& self) {
+/// Made without the GIL where they are not there.
+Bricks heldBricks(const Self& self) {
   Bricks bricks;
   Watch watch;
-  watched(watch, py::none(), [&] { bricks = self->bricks(); });
+  atOnce(watch, [&] { bricks = self->bricks(); });
+  return bricks;
+}
+
+std::shared_ptr<const BrickGrid> onlyBricks(const Self& self) {
+  const Bricks bricks = heldBricks(self);
   if (bricks.size() != 1) throw py::type_error("a grid of vectors has bricks for each of its components");
   return bricks[0];
 }
@@ -244,9 +250,7 @@ py::tuple bricksView(const Self& self) {
 }
 
 py::object fieldOf(const Self& self) {
-  Bricks bricks;
-  Watch watch;
-  watched(watch, py::none(), [&] { bricks = self->bricks(); });
+  const Bricks bricks = heldBricks(self);
   if (bricks.size() == 1) return toPython(felt::Value(gridField(bricks[0])));
   return toPython(felt::Value(gridField(VectorGrids{bricks[0], bricks[1], bricks[2]})));
 }
@@ -379,14 +383,14 @@ void addGrids(py::module_& module) {
       .def_property_readonly(
           "is_vector", [](const Self& s) { return s->isVector(); }, "Whether it holds vectors.")
       .def_property_readonly(
-          "voxel_size", [](const Self& s) { return s->bricks()[0]->voxelSize(); },
+          "voxel_size", [](const Self& s) { return heldBricks(s)[0]->voxelSize(); },
           "Edge of a voxel, world units.")
       .def_property_readonly(
-          "background", [](const Self& s) { return s->bricks()[0]->background(); }, "The value outside.")
+          "background", [](const Self& s) { return heldBricks(s)[0]->background(); }, "The value outside.")
       .def_property_readonly(
           "transform",
           [](const Self& s) {
-            const Affine map = s->bricks()[0]->indexToWorld();
+            const Affine map = heldBricks(s)[0]->indexToWorld();
             py::array_t<double> matrix(std::vector<py::ssize_t>{4, 4});
             auto m = matrix.mutable_unchecked<2>();
             for (int r = 0; r < 4; ++r)
