@@ -40,8 +40,8 @@ std::string heading(const std::string& page, const std::string& summary) {
   std::string lower = summary;
   if (!lower.empty()) lower[0] = char(std::tolower(static_cast<unsigned char>(lower[0])));
   if (lower.ends_with('.')) lower.pop_back();
-  return fmt::format(".TH {} 1 \"\" \"nephele {}\" \"Nephele\"\n.ad l\n.nh\n.SH NAME\n{} \\- {}\n", roff(page),
-                     NEPHELE_VERSION, roff(page), roff(lower));
+  return fmt::format(".TH {} 1 \"\" \"nephele {}\" \"Nephele\"\n.ad l\n.nh\n.SH NAME\n{} \\- {}\n",
+                     roff(page), NEPHELE_VERSION, roff(page), roff(lower));
 }
 
 std::string entry(const OptionRow& row) {

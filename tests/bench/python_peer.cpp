@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "nephele/modeling/base/parallel.h"
-#include "nephele/nephele.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/noise/noise.h"
+#include "nephele/modeling/shape/shapes.h"
 
 int main() {
   using namespace nephele;
