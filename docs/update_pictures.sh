@@ -426,6 +426,38 @@ if picture tutorial_07; then
   padding="" tiles tutorial_07.jpg 3x1 first.png second.png third.png
 fi
 
+# Minutes each, where nothing is sampled.
+if picture figure_6_5; then
+  files=
+  for densities in gridded gridless; do
+    for steps in 30 60; do
+      show "gases_${densities}_$steps" felt/hot_and_cold.felt --size 240x240 --view 20,3 --set steps=$steps --set densities="\"$densities\""
+      files="$files gases_${densities}_$steps.png"
+    done
+  done
+  padding="" tiles figure_6_5.jpg 2x2 $files
+fi
+
+if picture figure_6_6; then
+  files=
+  for steps in 11 29 74 124 200; do
+    show slab_$steps felt/figures/slab.felt --size 300x300 --view 25,8 --set cells=80 --set steps=$steps
+    files="$files slab_$steps.png"
+  done
+  padding="" tiles figure_6_6.jpg 5x1 $files
+fi
+
+if picture figure_7_2; then
+  show spheres_0 felt/figures/spheres.felt --size 320x320 --view 0,0 --set steps=0
+  show spheres_map felt/figures/spheres.felt --size 320x320 --view 0,0 --set 'sampled="map"'
+  files=spheres_0.png
+  for gridded in 60 59 50 0; do
+    show spheres_sampled_$gridded felt/figures/spheres.felt --size 320x320 --view 0,0 --set gridded=$gridded
+    files="$files spheres_sampled_$gridded.png"
+  done
+  padding=:pad=4 tiles figure_7_2.jpg 3x2 $files spheres_map.png
+fi
+
 if picture hot_and_cold; then
   "$program" render felt/hot_and_cold.felt --preview hot_and_cold.png --size 640x640 --view 20,3 --set cells=120 --set steps=75 --quiet
   oiiotool hot_and_cold.png --quality 90 -o hot_and_cold.jpg

@@ -223,8 +223,16 @@ TEST_F(FeltVerb, SlicesAFieldAsTextAndAsAPicture) {
   EXPECT_TRUE(contains(info.output, "512")) << info.output << info.errors;
 }
 
+TEST_F(FeltVerb, RunsTheFiguresOfTheNotes) {
+  for (const char* name : {"slab", "spheres"}) {
+    const ProgramResult result =
+        runProgram("felt run " + ownData("data/felt/figures/") + name + ".felt --set steps=2");
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+  }
+}
+
 TEST_F(FeltVerb, RunsTheScriptsOfTheProject) {
-  for (const auto& entry : std::filesystem::directory_iterator(ownData("data/felt"))) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(ownData("data/felt"))) {
     if (entry.path().extension() != ".felt") continue;
     const std::string path = entry.path().string();
     const ProgramResult checked = runProgram("felt check " + path);
