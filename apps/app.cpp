@@ -180,7 +180,7 @@ void check(Command& command, const Line& line, const Run& run) {
   requireDistinctOutputs(command.app);
   if (line.sequence)
     line.sequence->check(command.app, run);
-  else
+  else if (!command.verb.passesOthersOn)
     refuseFrameNames(command.app);
   for (std::size_t i = 1; line.wedge && i < line.calls.count; ++i)
     Command(command.verb).parse(line.calls.at(i).arguments);
@@ -214,6 +214,7 @@ Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<st
   const std::string& name = command.verb.name;
   const std::vector<std::string> names = namesOf(verbs);
   const auto withSettings = [&](std::vector<std::string> typed) {
+    if (command.verb.passesOthersOn) return typed;
     return withConfigFile({command.app, name, names}, std::move(typed));
   };
   arguments = withCurrentNames(name, withFilesAfterDashes(std::move(arguments)), note);
@@ -292,8 +293,8 @@ std::string overview(const std::vector<Verb>& verbs) {
 }  // namespace
 
 std::vector<Verb> allVerbs() {
-  return {levelsetVerb(), cloudVerb(),     advectVerb(), wispsVerb(),     meshVerb(), cutVerb(),
-          transferVerb(), transformVerb(), renderVerb(), turntableVerb(), infoVerb(), feltVerb()};
+  return {levelsetVerb(),  cloudVerb(),  advectVerb(),    wispsVerb(), meshVerb(), cutVerb(), transferVerb(),
+          transformVerb(), renderVerb(), turntableVerb(), infoVerb(),  feltVerb(), lookVerb()};
 }
 
 nlohmann::json callVerb(const std::string& name, std::vector<std::string> arguments, const MakeRun& makeRun) {

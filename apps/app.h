@@ -111,6 +111,8 @@ struct Verb {
   std::function<BoundVerb(CLI::App&)> bind;
   /// What --help says between the options and the example.
   std::string notes{};
+  /// What is no option of it is not refused but left for the verb to read, and so are files of options.
+  bool passesOthersOn = false;
 };
 
 /// A verb whose body, and what measures its input, work on the options that were bound.
@@ -140,6 +142,7 @@ Verb renderVerb();
 Verb turntableVerb();
 Verb infoVerb();
 Verb feltVerb();
+Verb lookVerb();
 
 /// Every verb, in the order of the overview.
 std::vector<Verb> allVerbs();

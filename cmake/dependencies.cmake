@@ -52,6 +52,11 @@ endif()
 if(NEPHELE_BUILD_APPS)
   find_package(CLI11 REQUIRED)
   find_package(tomlplusplus REQUIRED)
+  # The viewer's server and its pictures. Debian's cpp-httplib has no CMake configuration.
+  find_path(HTTPLIB_INCLUDE_DIR httplib.h REQUIRED)
+  find_library(HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+  find_path(TURBOJPEG_INCLUDE_DIR turbojpeg.h REQUIRED)
+  find_library(TURBOJPEG_LIBRARY turbojpeg REQUIRED)
 endif()
 if(NEPHELE_BUILD_PYTHON AND NEPHELE_BUILD_APPS AND NOT NEPHELE_SANITIZE STREQUAL "fuzzer")
   # Debian's, which has the packages; another one by -DPython_EXECUTABLE=...

@@ -27,6 +27,7 @@ render/volume     modeling levelset render/image render/scene
 render/light      modeling levelset render/image render/scene render/volume
 render/march      modeling levelset render/image render/scene render/volume render/light
 render/preview    modeling levelset render/image render/scene render/volume render/light render/march
+render/session    modeling levelset render/image render/scene render/volume render/light render/march render/preview
 render/felt       modeling levelset render
 '
 

@@ -104,7 +104,7 @@ Command::Command(const Verb& of) : verb(of), app(of.summary, "nephele " + of.nam
   // Collected, so that a suggestion can be made for each.
   app.allow_extras();
   bound = verb.bind(app);
-  ownFrames_ = app.get_option_no_throw("--frames") != nullptr;
+  ownFrames_ = verb.passesOthersOn || app.get_option_no_throw("--frames") != nullptr;
   if (!ownFrames_) addSeveralCalls(app, options);
   addCommonOptions(app, options);
 }
@@ -113,6 +113,7 @@ void Command::parse(std::vector<std::string> arguments) {
   for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
+  if (verb.passesOthersOn) return;
   for (const std::string& extra : app.remaining()) {
     if (!extra.starts_with('-'))
       throw CLI::ParseError(fmt::format("'{}' is one argument too many", extra), CLI::ExitCodes::ExtrasError);

@@ -13,11 +13,19 @@
 
 namespace nephele::apps {
 
+float CloudAdvectionArguments::farthest(FieldSources& sources, const ScalarField& way) const {
+  return way.range(sources.box().expanded(float(sources.longestSide()) / 2)).max;
+}
+
+bool CloudAdvectionArguments::isAny(FieldSources& sources) const {
+  return wind || farthest(sources, sources.field(strength)) > 0;
+}
+
 VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, FieldSources& sources, int seed,
                                          Run& run) const {
   const double longestSide = sources.longestSide();
   const ScalarField way = sources.field(strength);
-  const float most = way.range(sources.box().expanded(float(longestSide) / 2)).max;
+  const float most = farthest(sources, way);
   if (most == 0 && !wind) return density;
   run.begin("advect");
   VelocityArguments velocity;

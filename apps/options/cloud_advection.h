@@ -28,10 +28,13 @@ struct CloudAdvectionArguments {
   int steps = 4;
   std::optional<Wind> wind{};
 
+  /// Whether anything is carried along.
+  bool isAny(FieldSources& sources) const;
   /// `density` carried along, or itself. Several octaves of noise, drawn from `seed`.
   VdbGrid carried(const VdbGrid& density, FieldSources& sources, int seed, Run& run) const;
 
  private:
+  float farthest(FieldSources& sources, const ScalarField& way) const;
   VectorField windOver(const FieldSources& sources, int seed) const;
 };
 

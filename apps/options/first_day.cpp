@@ -8,12 +8,6 @@
 #include "apps/options/common_group.h"
 
 namespace nephele::apps {
-namespace {
-
-struct FirstDay {
-  std::string_view verb, group;
-  std::vector<std::string_view> options;
-};
 
 const std::vector<FirstDay>& firstDays() {
   static const std::vector<FirstDay> all{
@@ -54,6 +48,8 @@ const std::vector<FirstDay>& firstDays() {
   };
   return all;
 }
+
+namespace {
 
 /// What is not shown is not named either.
 void forgetHidden(CLI::Option& option) {

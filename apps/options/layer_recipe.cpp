@@ -221,6 +221,10 @@ std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
   return layers;
 }
 
+bool isLayerRecipe(const std::string& path) {
+  return readToml("--recipe", path).contains("layer");
+}
+
 std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,
                                       FieldSources& sources) {
   std::vector<CumuloLayer> layers;

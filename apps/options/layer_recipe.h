@@ -36,6 +36,9 @@ struct LayerRecipe {
 /// is allowed.
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path);
 
+/// Whether a TOML file has layers, and not options. @throws CLI::ValidationError as readLayerRecipe.
+bool isLayerRecipe(const std::string& path);
+
 /// The layers of `fractal`, of which the first are changed as the recipes say. What is not changed is the
 /// same bit for bit. @throws Error naming the place in the recipe.
 std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,

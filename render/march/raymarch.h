@@ -62,6 +62,8 @@ class LitVolume {
   std::unique_ptr<Integrator> integrator(const RenderOptions& options) const;
 
   const Lights& lights() const { return lights_; }
+  /// Null where there are none.
+  const std::shared_ptr<const Surfaces>& surfaces() const { return surfaces_; }
   /// What it took to make the light.
   double lightSeconds() const { return lightSeconds_; }
 

@@ -117,7 +117,11 @@ void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, b
     if (isGiven && objects.empty())
       throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");
   picture.render.surfaces = surfaces(volume, picture.seen, mostBytes);
-  picture.backdrop = backdrop.value_or(isShown && picture.lights.clear && !picture.background);
+  picture.backdrop = showsBackdrop(picture, isShown);
+}
+
+bool ObjectOptions::showsBackdrop(const PictureOptions& picture, bool isShown) const {
+  return backdrop.value_or(isShown && picture.lights.clear && !picture.background);
 }
 
 }  // namespace nephele::apps

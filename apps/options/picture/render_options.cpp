@@ -147,7 +147,8 @@ Extent extentOf(const RenderVolume& volume) {
   return {volume.worldBounds(), double(volume.worldBounds().longestSide()), volume.outline()};
 }
 
-PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& run) const {
+PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& run,
+                                        const Lights* made) const {
   PictureOptions result = *this;
   static_cast<CameraOptions&>(result) = placed(extentOf(volume), run);
   result.chooseByScale(volume, run);
@@ -157,7 +158,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
   result.chooseByQuality(volume);
-  result.lights = light.resolved(result.seen.longestSide, run.memoryLimitBytes);
+  result.lights = made ? *made : light.resolved(result.seen.longestSide, run.memoryLimitBytes);
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");

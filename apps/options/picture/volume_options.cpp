@@ -201,4 +201,32 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   return *std::move(only);
 }
 
+RenderVolume volumeOf(const std::shared_ptr<const BrickGrid>& density, const VolumeOptions& options,
+                      const VolumeReading& reading, Run& run) {
+  const auto isAsked = [](const char* option, const std::vector<std::string>& names) {
+    if (names.empty() || names[0] == "none") return false;
+    if (names[0] != "density")
+      throw CLI::ValidationError(option,
+                                 fmt::format("got '{}', and the cloud has one grid, density", names[0]));
+    return true;
+  };
+  VolumePart part;
+  part.density = density;
+  isAsked("--grid", options.densityGrids);
+  part.share = float(entryOf(options.densityScales, 0, 1.0));
+  if (reading.holdsObjects && part.share == 0) part.share = 1e-12f;
+  if (isAsked("--color-grid", options.colourGrids))
+    part.colour = {density, density, density};
+  else if (!options.color.empty())
+    part.colour = colourOf(options.color, *density, run);
+  if (isAsked("--emission-grid", options.emissionGrids)) part.emission = {density, density, density};
+  if (isAsked("--temperature-grid", options.temperatureGrids)) part.temperature = density;
+  if (!options.velocityGrids.empty())
+    throw CLI::ValidationError("--velocity-grid", "the cloud has no velocities");
+  part.emissionScale = float(options.emissionScale);
+  part.temperatureScale = float(options.temperatureScale);
+  check(part);
+  return combine({part}, run);
+}
+
 }  // namespace nephele::apps

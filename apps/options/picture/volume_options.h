@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -45,5 +46,10 @@ struct VolumeReading {
 /// @throws Error naming the path if a grid is missing, a level set, or larger than the memory allowed.
 RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
                          const VolumeReading& reading, Run& run);
+
+/// The same of a density that is there already, as if a file held it and nothing else, as 'density'.
+/// @throws Error for names of other grids.
+RenderVolume volumeOf(const std::shared_ptr<const BrickGrid>& density, const VolumeOptions& options,
+                      const VolumeReading& reading, Run& run);
 
 }  // namespace nephele::apps

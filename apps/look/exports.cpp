@@ -1,0 +1,183 @@
+#include "apps/look/exports.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "nephele/levelset/io/output_file.h"
+
+namespace nephele::apps {
+namespace {
+
+std::string quotedText(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+void addTable(std::string& text, const std::string& name, const nlohmann::json& settings) {
+  if (settings.empty()) return;
+  text += (text.empty() ? "[" : "\n[") + name + "]\n";
+  for (const auto& [key, value] : settings.items()) {
+    text += key + " = ";
+    if (value.is_boolean()) {
+      text += value.get<bool>() ? "true" : "false";
+    } else if (value.is_array()) {
+      text += "[";
+      for (std::size_t i = 0; i < value.size(); ++i)
+        text += (i ? ", " : "") + quotedText(value[i].get<std::string>());
+      text += "]";
+    } else {
+      text += quotedText(value.get<std::string>());
+    }
+    text += '\n';
+  }
+}
+
+
+std::filesystem::path folderOfLooks() {
+  const char* config = std::getenv("XDG_CONFIG_HOME");
+  const char* home = std::getenv("HOME");
+  require((config && *config) || (home && *home), "looks are saved in the home folder, and $HOME is not set");
+  return std::filesystem::path(config && *config ? config : std::string(home) + "/.config") / "nephele" /
+         "looks";
+}
+
+}  // namespace
+
+std::string typedLine(const std::vector<std::string>& words) {
+  std::string line = "nephele";
+  for (const std::string& word : words) {
+    const bool isPlain = !word.empty() && word.find_first_of(" \t\n'\"\\$*?&;|<>()#`") == std::string::npos;
+    std::string safe = word;
+    if (!isPlain) {
+      safe = "'";
+      for (const char c : word) safe += c == '\'' ? std::string("'\\''") : std::string(1, c);
+      safe += "'";
+    }
+    line += " " + safe;
+  }
+  return line;
+}
+
+std::vector<std::string> LookExports::cloudLine(const std::string& output) const {
+  std::vector<std::string> line{"cloud"};
+  LookSettings::value_type own = settings["cloud"];
+  if (subject.path.empty()) {
+    if (!own.contains("species")) own["species"] = "mediocris";
+  } else {
+    line.push_back(subject.path);
+  }
+  line.push_back("-o");
+  line.push_back(output);
+  for (std::string& argument : argumentsOf(own)) line.push_back(std::move(argument));
+  return line;
+}
+
+std::vector<std::string> LookExports::pictureLine(const std::string& verb, const std::string& volume) const {
+  std::vector<std::string> line{verb, subject.hasCloud() ? volume : subject.path};
+  for (std::string& argument : argumentsOf(settings["render"])) line.push_back(std::move(argument));
+  for (const auto& [name, value] : settings["parameters"].items()) {
+    line.push_back("--set");
+    line.push_back(name + "=" + (value.is_string() ? value.get<std::string>() : value.dump()));
+  }
+  line.push_back(fmt::format("--size={}x{}", width, height));
+  return line;
+}
+
+std::vector<std::string> LookExports::typed() const {
+  std::vector<std::string> lines;
+  if (subject.hasCloud()) lines.push_back(typedLine(cloudLine("cloud.vdb")));
+  std::vector<std::string> picture = pictureLine("render", "cloud.vdb");
+  picture.insert(picture.end(), {"-o", "cloud.exr", "--preview", "cloud.png"});
+  lines.push_back(typedLine(picture));
+  return lines;
+}
+
+std::string LookExports::recipe() const {
+  std::string text;
+  if (subject.hasCloud()) addTable(text, "cloud", settings["cloud"]);
+  auto render = settings["render"];
+  for (const auto& [name, value] : settings["parameters"].items())
+    render["set"].push_back(name + "=" + (value.is_string() ? value.get<std::string>() : value.dump()));
+  addTable(text, "render", render);
+  return text;
+}
+
+std::string LookExports::script() const {
+  std::ifstream file(subject.path, std::ios::binary);
+  require(file.good(), subject.path + ": cannot be read");
+  std::ostringstream whole;
+  whole << file.rdbuf();
+  std::string text = whole.str();
+  for (const auto& [name, value] : settings["parameters"].items()) {
+    const std::string set = value.is_string() ? value.get<std::string>() : value.dump();
+    // param TYPE NAME = VALUE, up to the range, the text or the end of the statement.
+    const std::regex declared("(\\bparam\\s+[A-Za-z]+(?:\\s*\\[\\s*\\])?\\s+" + name +
+                              "\\s*=\\s*)((?:\"[^\"]*\"|\\([^;]*?\\)|[^;\"]*?))(\\s*(?:\\bin\\b|;|\"))");
+    std::smatch found;
+    if (std::regex_search(text, found, declared))
+      text = found.prefix().str() + found[1].str() + set + found[3].str() + found.suffix().str();
+  }
+  return text;
+}
+
+nlohmann::json savedLooks() {
+  auto looks = nlohmann::json::array();
+  std::error_code error;
+  std::vector<std::filesystem::path> paths;
+  try {
+    for (const auto& entry : std::filesystem::directory_iterator(folderOfLooks(), error))
+      if (entry.path().extension() == ".json") paths.push_back(entry.path());
+  } catch (const Error&) {
+    return looks;
+  }
+  std::ranges::sort(paths);
+  for (const auto& path : paths) try {
+      std::ifstream file(path);
+      looks.push_back(
+          {{"name", path.stem().string()}, {"settings", checkedSettings(nlohmann::json::parse(file))}});
+    } catch (const std::exception&) {
+      // Somebody else's file.
+    }
+  return looks;
+}
+
+void saveLook(const std::string& name, const LookSettings& settings) {
+  static const std::regex plain("[A-Za-z0-9][A-Za-z0-9 _-]{0,63}");
+  if (!std::regex_match(name, plain))
+    throw LookFault(
+        "", "the name of a look: letters, digits, spaces, - and _, at most 64, and a letter or digit first");
+  const std::filesystem::path folder = folderOfLooks();
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  require(!error, folder.string() + ": cannot be made: " + error.message());
+  OutputFile output((folder / (name + ".json")).string());
+  OutputStream stream(output);
+  stream.write(settings.dump(2) + "\n");
+  stream.close();
+  output.commit();
+}
+
+std::string plainFileName(const std::string& name, const std::vector<std::string>& extensions) {
+  const bool isPlain = !name.empty() && name.size() <= 200 && name.front() != '.' && name.front() != '-' &&
+                       name.find_first_of("/\\\n\r\t") == std::string::npos &&
+                       name.find('\0') == std::string::npos;
+  const bool fits = std::ranges::any_of(extensions, [&](const std::string& extension) {
+    return name.ends_with(extension) && name.size() > extension.size();
+  });
+  if (!isPlain || !fits)
+    throw LookFault("", fmt::format("file: got '{}', allowed: a name without folders that ends with {}", name,
+                                    fmt::join(extensions, " or ")));
+  return name;
+}
+
+}  // namespace nephele::apps

@@ -1,0 +1,173 @@
+#include "apps/look/tier.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "nephele/levelset/grid/bake.h"
+#include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/grid/voxel_grid.h"
+#include "nephele/levelset/io/vdb_io.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/field/operations.h"
+#include "nephele/render/preview/surface_picture.h"
+
+namespace nephele::apps {
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The same density on voxels that make a quick picture of it.
+RenderVolume coarser(const RenderVolume& volume, Run& run) {
+  const BrickGrid& grid = volume.density();
+  const float longest = volume.worldBounds().longestSide();
+  const float voxel = std::max(grid.voxelSize(), longest / LookPlan::kCoarseVoxels);
+  // Keeps the grid for as long as the field is asked.
+  const std::shared_ptr<const BrickGrid> kept(std::shared_ptr<void>(), &grid);
+  run.begin("coarse density");
+  return RenderVolume(bakeGrid(max(gridField(kept), 0.0f),
+                               {.voxelSize = voxel, .box = volume.worldBounds(), .background = 0.0f}, run));
+}
+
+}  // namespace
+
+PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
+  PictureStages::Keys keys = plan.keys(tier_);
+  const auto reach = reaches_.find(keys.shape + keys.levels + keys.volume);
+  if (reach != reaches_.end()) keys.levels += reach->second;
+  return keys;
+}
+
+std::shared_ptr<const CloudLevels> LookTier::levels(const LookPlan& plan, Run& run) {
+  const CloudArguments cloud = plan.cloudOf(tier_);
+  const PictureStages::Keys keys = plan.keys(tier_);
+  const auto mesh = stages_.shape(keys.shape, [&] { return cloud.shapeOf(cloud.shape, run); });
+  FieldSources sources = cloud.sources(*mesh, run);
+  const CloudOptions options = cloud.resolved(sources, run);
+  run.requireMemory(estimatedCloudBytes(*mesh, options),
+                    "use larger voxels (a lower --resolution or a larger --voxel-size)");
+  constexpr std::size_t kMostReaches = 256;
+  if (reaches_.size() > kMostReaches) reaches_.clear();
+  const float edge = options.edgeThickness.range(Box::everywhere()).max;
+  reaches_[keys.shape + keys.levels + keys.volume] =
+      fmt::format("reach={:g}", cloudEdgeReach(edge, options.voxelSize));
+  return stages_.levels(keysOf(plan).levels, options, run);
+}
+
+RenderVolume LookTier::cloudVolume(const LookPlan& plan, Run& run) {
+  const CloudArguments cloud = plan.cloudOf(tier_);
+  const auto mesh = stages_.shape(plan.keys(tier_).shape, [&] { return cloud.shapeOf(cloud.shape, run); });
+  FieldSources sources = cloud.sources(*mesh, run);
+  const CloudOptions options = cloud.resolved(sources, run);
+  const auto itsLevels = levels(plan, run);
+  VoxelGrid<float> density = makeCloud(*itsLevels, options, run).density;
+  std::shared_ptr<const BrickGrid> bricks;
+  if (cloud.advection.isAny(sources))
+    bricks = toBricks(
+        cloud.advection.carried(toVdb(std::move(density), {"density", VdbGridInfo::Class::fogVolume, false}),
+                                sources, cloud.seed, run));
+  else
+    bricks = toBricks(density);
+  return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
+}
+
+std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookTier* finer, Run& run) {
+  const PictureStages::Keys keys = plan.keys(tier_);
+  if (plan.subject.hasCloud()) {
+    levels(plan, run);
+    return stages_.volume(keys.volume, [&] { return cloudVolume(plan, run); });
+  }
+  return stages_.volume(keys.volume, [&] {
+    if (finer) return coarser(*finer->volume(plan, nullptr, run), run);
+    PictureOptions picture = plan.picture;
+    return plan.scene.volume(picture, run);
+  });
+}
+
+LookTier::Picture LookTier::surfacePicture(const LookPlan& plan, const Frame& frame, LookTier* finer,
+                                           Run& run) {
+  const bool isChecker = frame.show.what == LookShow::What::checker;
+  const PictureStages::Keys keys = plan.keys(tier_);
+  if (isChecker && !plan.subject.hasCloud())
+    throw LookFault("", "there is no mesh whose texture coordinates could be shown");
+  const std::string key = keys.shape + (isChecker ? "" : keys.levels + keys.volume);
+  const auto mesh = surface_.at(key, [&] {
+    if (isChecker) {
+      const CloudArguments& cloud = plan.cloud;
+      return stages_.shape(keys.shape, [&] { return cloud.shapeOf(cloud.shape, run); });
+    }
+    if (plan.subject.hasCloud())
+      return std::make_shared<const Mesh>(
+          marchingCubes(*toBricks(cloudSurface(*levels(plan, run), run)), 0.0f, run));
+    const auto density = volume(plan, finer, run);
+    return std::make_shared<const Mesh>(marchingCubes(density->density(), 0.5f * density->maxDensity(), run));
+  });
+  if (mesh->faceCount() == 0) throw LookFault("", "there is no surface to be seen");
+  PictureOptions picture = plan.pictureOf(tier_);
+  picture.frame.width = frame.width;
+  picture.frame.height = frame.height;
+  Extent extent{boundingBox(*mesh), double(boundingBox(*mesh).longestSide())};
+  for (const Vec3d& p : mesh->positions) extent.outline.emplace_back(p);
+  static_cast<CameraOptions&>(picture) = picture.placed(extent, run);
+  const Camera camera = picture.camera();
+  SurfaceObject object{.mesh = *mesh, .colour = kShapeColour};
+  const bool hasUv =
+      std::ranges::any_of(mesh->attributes, [](const MeshAttribute& a) { return a.name == "uv"; });
+  if (isChecker && !hasUv) throw LookFault("", "the mesh has no texture coordinates");
+  if (isChecker) object.checkers = 16;
+  SurfacePictureOptions shown;
+  shown.camera = camera;
+  shown.samples = frame.samples == 1 ? 2 : 8;
+  run.begin("surface");
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<SurfaceObject> objects;
+  objects.push_back(std::move(object));
+  auto image = std::make_shared<const Image>(pictureSurfaces(std::move(objects), shown, run));
+  return {
+      image, camera, picture, extent.box, std::uint64_t(frame.width) * frame.height, 0, secondsSince(start)};
+}
+
+LookTier::Picture LookTier::picture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run) {
+  if (frame.show.what != LookShow::What::cloud) return surfacePicture(plan, frame, finer, run);
+  PictureOptions picture = plan.pictureOf(tier_);
+  picture.frame.width = frame.width;
+  picture.frame.height = frame.height;
+  picture.render.aovs = frame.show.layers();
+  std::shared_ptr<const LitCloud> lit;
+  if (isLit(plan)) {
+    lit = stages_.lit();
+    picture = picture.resolved(*lit->volume, run, &lit->light.lights());
+    picture.backdrop = plan.scene.objects.showsBackdrop(picture, true);
+  } else {
+    const auto density = volume(plan, finer, run);
+    picture = picture.resolved(*density, run);
+    plan.scene.addTo(picture, *density, true, run);
+    const PictureStages::Keys keys = plan.keys(tier_);
+    lit =
+        stages_.light(keys.medium, keys.lights,
+                      {picture.medium, picture.lights, picture.render.octaves, picture.render.surfaces}, run);
+  }
+  if (frame.samples > 0) picture.render.samples = frame.samples;
+  const Camera camera = picture.camera();
+  // Read again for each: what stands in front may have changed.
+  if (!plan.scene.holdout.empty())
+    picture.render.holdout = readHoldout(plan.scene.holdout, camera, run.memoryLimitBytes);
+  picture.render.surfaces = lit->light.surfaces();
+  const double rays = double(frame.width) * frame.height * picture.render.samples;
+  const auto start = std::chrono::steady_clock::now();
+  const std::string key = plan.cameraKey() + fmt::format("{}x{}x{};{}", frame.width, frame.height,
+                                                         frame.samples, frame.show.layer);
+  const auto result =
+      stages_.picture(key, camera, frame.samples > 0 ? picture.render : picture.marched(camera), run);
+  const double seconds = secondsSince(start);
+  if (seconds > 1e-3) secondsPerRay_ = 0.5 * (secondsPerRay_ + seconds / rays);
+  auto image = std::make_shared<Image>(result->image);
+  picture.addSky(*image, camera, picture.lights);
+  return {image,        camera,
+          picture,      lit->volume->worldBounds(),
+          result->rays, double(lit->volume->density().voxelSize()),
+          seconds};
+}
+
+}  // namespace nephele::apps

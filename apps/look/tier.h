@@ -1,0 +1,59 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "apps/look/plan.h"
+#include "apps/look/shown.h"
+#include "nephele/levelset/grid/brick_grid.h"
+#include "nephele/render/session/picture_stages.h"
+
+namespace nephele::apps {
+
+/// The steps to pictures of one amount of work, with what was made last.
+class LookTier {
+ public:
+  explicit LookTier(LookPlan::Tier tier) : tier_(tier) {}
+
+  /// What a picture is to be.
+  struct Frame {
+    int width = 640, height = 360;
+    /// Rays per pixel; 0: as set.
+    int samples = 1;
+    LookShow show{};
+  };
+  struct Picture {
+    std::shared_ptr<const Image> image;
+    Camera camera;
+    /// As they were taken, with all that follows from the volume.
+    PictureOptions options;
+    Box bounds;
+    std::uint64_t rays = 0;
+    double voxelSize = 0, marchSeconds = 0;
+  };
+
+  /// Whether a picture only needs to be marched.
+  bool isLit(const LookPlan& plan) const { return stages_.isLit(keysOf(plan)); }
+  /// Makes what is not there, and the picture. `finer`, if there is one, lends its volume where that is what
+  /// is read from a file. @throws Error; Cancelled.
+  Picture picture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
+  /// Seconds that so many rays will take, from those before.
+  double expectedSeconds(double rays) const { return rays * secondsPerRay_; }
+
+ private:
+  PictureStages::Keys keysOf(const LookPlan& plan) const;
+  std::shared_ptr<const RenderVolume> volume(const LookPlan& plan, LookTier* finer, Run& run);
+  std::shared_ptr<const CloudLevels> levels(const LookPlan& plan, Run& run);
+  RenderVolume cloudVolume(const LookPlan& plan, Run& run);
+  Picture surfacePicture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
+
+  LookPlan::Tier tier_;
+  PictureStages stages_;
+  Stage<Mesh> surface_;
+  // How far layers reach, by the keys of shape, layers and volume.
+  std::map<std::string, std::string> reaches_;
+  double secondsPerRay_ = 1.5e-6;
+};
+
+}  // namespace nephele::apps

@@ -1,0 +1,92 @@
+#include "nephele/render/session/picture_stages.h"
+
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+namespace {
+
+// No key contains it, so that keys side by side cannot be mistaken for others.
+constexpr char kBetween = '\n';
+
+std::string joined(const std::string& before, const std::string& own) {
+  return before + kBetween + own;
+}
+
+}  // namespace
+
+std::shared_ptr<const Mesh> PictureStages::shape(const std::string& key, const std::function<Mesh()>& read) {
+  if (!shape_.isAt(key)) {
+    picture_.forget();
+    light_.forget();
+    volume_.forget();
+    levels_.forget();
+  }
+  return shape_.at(key, [&] { return std::make_shared<const Mesh>(read()); });
+}
+
+std::shared_ptr<const CloudLevels> PictureStages::levels(const std::string& key, const CloudOptions& options,
+                                                         const Progress& progress) {
+  require(shape_.kept() != nullptr, "PictureStages: levels need a shape");
+  const std::string whole = joined(shape_.key(), key);
+  if (!levels_.isAt(whole)) {
+    picture_.forget();
+    light_.forget();
+    volume_.forget();
+  }
+  return levels_.at(whole, [&] {
+    return std::make_shared<const CloudLevels>(makeCloudLevels(*shape_.kept(), options, progress));
+  });
+}
+
+std::shared_ptr<const RenderVolume> PictureStages::volume(const std::string& key,
+                                                          const std::function<RenderVolume()>& make) {
+  const std::string whole = joined(levels_.key(), key);
+  if (!volume_.isAt(whole)) {
+    picture_.forget();
+    light_.forget();
+  }
+  return volume_.at(whole, [&] { return std::make_shared<const RenderVolume>(make()); });
+}
+
+std::shared_ptr<const LitCloud> PictureStages::light(const std::string& mediumKey,
+                                                     const std::string& lightsKey, const LightSetup& setup,
+                                                     const Progress& progress) {
+  require(volume_.kept() != nullptr, "PictureStages: light needs a volume");
+  const std::string medium = joined(volume_.key(), mediumKey), whole = joined(medium, lightsKey);
+  if (!light_.isAt(whole)) picture_.forget();
+  if (mediumKey_ != medium) light_.forget();
+  const std::shared_ptr<const LitCloud> result =
+      light_.following(whole, [&](const std::shared_ptr<const LitCloud>& before) {
+        const std::shared_ptr<const RenderVolume>& volume = volume_.kept();
+        return std::make_shared<const LitCloud>(
+            LitCloud{volume, before ? before->light.underOther(setup.lights, progress)
+                                    : LitVolume(*volume, setup.medium, setup.lights, setup.octaves, progress,
+                                                setup.surfaces)});
+      });
+  mediumKey_ = medium;
+  return result;
+}
+
+std::shared_ptr<const RenderResult> PictureStages::picture(const std::string& key, const Camera& camera,
+                                                           const RenderOptions& options,
+                                                           const Progress& progress) {
+  require(light_.kept() != nullptr, "PictureStages: a picture needs light");
+  return picture_.at(joined(light_.key(), key), [&] {
+    return std::make_shared<const RenderResult>(light_.kept()->light.render(camera, options, progress));
+  });
+}
+
+bool PictureStages::isLit(const Keys& keys) const {
+  const std::string levels = keys.levels.empty() ? std::string() : joined(keys.shape, keys.levels);
+  return light_.isAt(joined(joined(joined(levels, keys.volume), keys.medium), keys.lights));
+}
+
+void PictureStages::forget() {
+  picture_.forget();
+  light_.forget();
+  volume_.forget();
+  levels_.forget();
+  shape_.forget();
+}
+
+}  // namespace nephele
