@@ -55,6 +55,8 @@ if(NEPHELE_BUILD_APPS)
   # The viewer's server and its pictures. Debian's cpp-httplib has no CMake configuration.
   find_path(HTTPLIB_INCLUDE_DIR httplib.h REQUIRED)
   find_library(HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+  # As its pkg-config file says: its classes are larger with these than without.
+  set(HTTPLIB_DEFINITIONS CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT CPPHTTPLIB_BROTLI_SUPPORT)
   find_path(TURBOJPEG_INCLUDE_DIR turbojpeg.h REQUIRED)
   find_library(TURBOJPEG_LIBRARY turbojpeg REQUIRED)
 endif()

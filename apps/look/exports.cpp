@@ -42,7 +42,6 @@ void addTable(std::string& text, const std::string& name, const nlohmann::json& 
   }
 }
 
-
 std::filesystem::path folderOfLooks() {
   const char* config = std::getenv("XDG_CONFIG_HOME");
   const char* home = std::getenv("HOME");

@@ -11,9 +11,9 @@ using Names = std::vector<std::string_view>;
 // Options of the verb cloud that say what it grows on.
 const Names kOfShape{"species", "shape-seed", "shape-size", "combine", "blend", "repair", "subdivide"};
 // And those that only what comes after the layers depends on, see cloudEdgeReach for the edge.
-const Names kOfDensity{"half", "edge-thickness",           "density",          "edge-falloff", "flat-base",
-                       "interior-noise", "height-profile",   "thin-out",     "advect",
-                       "advect-steps",   "advect-frequency", "wind"};
+const Names kOfDensity{"half",      "edge-thickness", "density",          "edge-falloff",
+                       "flat-base", "interior-noise", "height-profile",   "thin-out",
+                       "advect",    "advect-steps",   "advect-frequency", "wind"};
 // Options of the verb render.
 const Names kOfLights{"sun", "point",         "spot",         "light-decay",   "shadow-multiplier",
                       "sky", "ground-albedo", "sky-rotation", "sky-intensity", "sky-encoding"};

@@ -144,6 +144,11 @@ LookServer::LookServer(const LookServerOptions& options)
   server_->set_write_timeout(10);
   server_->set_keep_alive_timeout(30);
   server_->set_tcp_nodelay(true);
+  // Its own choice would let two viewers share a port, and with it each other's pages.
+  server_->set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  });
   route();
   for (int i = 0; i < kMostPorts && port_ == 0 && options_.port + i <= 65535; ++i)
     if (server_->bind_to_port(options_.host, options_.port + i)) port_ = options_.port + i;

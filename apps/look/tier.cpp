@@ -30,6 +30,19 @@ RenderVolume coarser(const RenderVolume& volume, Run& run) {
                                {.voxelSize = voxel, .box = volume.worldBounds(), .background = 0.0f}, run));
 }
 
+/// Without layers that coarse voxels cannot show, and that take the most time.
+CloudOptions optionsOf(const CloudArguments& cloud, LookPlan::Tier tier, FieldSources& sources,
+                       const Run& run) {
+  CloudOptions options = cloud.resolved(sources, run);
+  if (tier == LookPlan::Tier::fine) return options;
+  // The absolute value doubles the frequencies of a noise, and a wave needs two voxels.
+  const float highest = 1 / (4 * options.voxelSize);
+  while (options.layers.size() > 1 &&
+         options.layers.back().frequency * options.layers.back().detail > highest)
+    options.layers.pop_back();
+  return options;
+}
+
 }  // namespace
 
 PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
@@ -44,7 +57,7 @@ std::shared_ptr<const CloudLevels> LookTier::levels(const LookPlan& plan, Run& r
   const PictureStages::Keys keys = plan.keys(tier_);
   const auto mesh = stages_.shape(keys.shape, [&] { return cloud.shapeOf(cloud.shape, run); });
   FieldSources sources = cloud.sources(*mesh, run);
-  const CloudOptions options = cloud.resolved(sources, run);
+  const CloudOptions options = optionsOf(cloud, tier_, sources, run);
   run.requireMemory(estimatedCloudBytes(*mesh, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
   constexpr std::size_t kMostReaches = 256;
@@ -59,7 +72,7 @@ RenderVolume LookTier::cloudVolume(const LookPlan& plan, Run& run) {
   const CloudArguments cloud = plan.cloudOf(tier_);
   const auto mesh = stages_.shape(plan.keys(tier_).shape, [&] { return cloud.shapeOf(cloud.shape, run); });
   FieldSources sources = cloud.sources(*mesh, run);
-  const CloudOptions options = cloud.resolved(sources, run);
+  const CloudOptions options = optionsOf(cloud, tier_, sources, run);
   const auto itsLevels = levels(plan, run);
   VoxelGrid<float> density = makeCloud(*itsLevels, options, run).density;
   std::shared_ptr<const BrickGrid> bricks;
