@@ -4,6 +4,7 @@ PACKAGES := $(shell cat cmake/packages.txt)
 FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
 LINT_PACKAGES := clang-format
 DOCS_PACKAGES := doxygen
+LOOK_PACKAGES := chromium
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
@@ -14,7 +15,7 @@ STRICT := OFF
 SECONDS := 60
 FORMATS :=
 
-.PHONY: all deps build demo examples test test-sanitized fuzz test-farm bench docs format lint install package clean
+.PHONY: all deps build demo examples test test-sanitized fuzz test-farm test-look bench docs format lint install package clean
 
 all: build
 
@@ -54,6 +55,12 @@ fuzz: deps
 	cmake --preset fuzz
 	cmake --build build-fuzz --target nephele_fuzz
 	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
+
+# The viewer's page in a browser; needs node 18 or newer, and npm for the browser's driver.
+test-look: build
+	@dpkg -s $(LOOK_PACKAGES) >/dev/null 2>&1 || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(LOOK_PACKAGES)
+	cd tests/look && npm ci && node --test
 
 # Starts a Slurm of its own, as root; not part of `make test`.
 test-farm: build
