@@ -1,13 +1,12 @@
 // What a user does on the viewer's page, in a browser, with the program. Expected are changes of what the canvas shows, by what the option
 // that is changed means: a sun behind darkens the front, exposure +2 brightens, other settings than these keep the picture.
 import assert from "node:assert/strict";
-import { existsSync, readdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
+import { copyFileSync, existsSync, readdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, describe, test } from "node:test";
 import { apart, difference, LookPage } from "./page.mjs";
 import { folderFor, kRoot, kSmall, startBrowser, startProgram, startWire } from "./program.mjs";
 
-const kBase = join(kRoot, "data/cloud_base.obj");
 const kLimit = { timeout: 90000 };
 // JPEG at another quality or level is nearer than this; what changes is farther.
 const kSame = 3;
@@ -18,9 +17,14 @@ before(async () => {
 });
 after(() => browser?.close());
 
+function startCloud(t, folder) {
+  copyFileSync(join(kRoot, "data/cloud_base.obj"), join(folder, "cloud_base.obj"));
+  return startProgram(t, ["cloud_base.obj", ...kSmall], folder);
+}
+
 async function cloud(t, options = {}) {
-  const folder = options.folder ?? folderFor(t);
-  const program = await startProgram(t, [kBase, ...kSmall, ...(options.args ?? [])], folder);
+  const folder = folderFor(t);
+  const program = await startCloud(t, folder);
   return { folder, program, look: await LookPage.open(t, browser, program.address, options) };
 }
 
@@ -298,7 +302,7 @@ scalarfield density = mask(sphere((0, 0, 0), size) + 0.2 * perlin(3, 1), 0.1);
 describe("the program", () => {
   test("is away for a moment, then back; then it ends", kLimit, async (t) => {
     const folder = folderFor(t);
-    const program = await startProgram(t, [kBase, ...kSmall], folder);
+    const program = await startCloud(t, folder);
     const wire = await startWire(t, program.address);
     const look = await LookPage.open(t, browser, wire.address);
     const before = await look.small();

@@ -145,7 +145,7 @@ class Control {
       text.title = String(shown).length > 8 ? String(shown) : "";
     }
     if (lines && document.activeElement !== lines) lines.value = (Array.isArray(given) ? given : given ? [given] : []).join("\n");
-    if (choice) choice.value = given === undefined ? "" : String(given);
+    if (choice) choice.value = given === undefined || String(given) === control.default ? "" : String(given);
     if (box) box.checked = given === undefined ? shown === "true" : given === true || given === "true";
     if (color) color.value = toHex(shown) ?? toHex(control.default) ?? "#808080";
     if (range) {

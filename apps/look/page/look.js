@@ -144,7 +144,7 @@ async function takePicture(message, payload) {
   if (!isShown) return;
   byId("picture").dataset.revision = message.revision;
   facts(message);
-  byId("stage-text").textContent = message.final ? "Final" : labelOf(message.stage);
+  if (settled !== message.revision) byId("stage-text").textContent = message.final ? "Final" : labelOf(message.stage);
   dome.update(message.camera);
   listLayers(message.layers);
 }
