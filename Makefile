@@ -14,7 +14,7 @@ STRICT := OFF
 SECONDS := 60
 FORMATS :=
 
-.PHONY: all deps build demo examples test test-sanitized fuzz test-farm bench docs format lint install package clean
+.PHONY: all deps build demo examples test test-sanitized fuzz test-farm test-look bench docs format lint install package clean
 
 all: build
 
@@ -54,6 +54,14 @@ fuzz: deps
 	cmake --preset fuzz
 	cmake --build build-fuzz --target nephele_fuzz
 	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
+
+# The page of `nephele look` in a browser; what was seen is kept in build/look-screenshots.
+test-look: deps
+	@for tool in chromium nodejs:node npm; do command -v $${tool#*:} >/dev/null || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $${tool%:*}; done
+	cmake --preset release
+	cmake --build build --target nephele
+	cd tests/look && npm ci --no-audit --no-fund && node --test
 
 # Starts a Slurm of its own, as root; not part of `make test`.
 test-farm: build
