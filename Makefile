@@ -4,7 +4,6 @@ PACKAGES := $(shell cat cmake/packages.txt)
 FARM_PACKAGES := $(shell cat cmake/packages_farm.txt)
 LINT_PACKAGES := clang-format
 DOCS_PACKAGES := doxygen
-LOOK_PACKAGES := chromium
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 RESULTS := build/demo
@@ -56,11 +55,13 @@ fuzz: deps
 	cmake --build build-fuzz --target nephele_fuzz
 	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
 
-# The viewer's page in a browser; needs node 18 or newer, and npm for the browser's driver.
-test-look: build
-	@dpkg -s $(LOOK_PACKAGES) >/dev/null 2>&1 || \
-	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(LOOK_PACKAGES)
-	cd tests/look && npm ci && node --test
+# The page of `nephele look` in a browser; what was seen is kept in build/look-screenshots.
+test-look: deps
+	@for tool in chromium nodejs:node npm; do command -v $${tool#*:} >/dev/null || \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $${tool%:*}; done
+	cmake --preset release
+	cmake --build build --target nephele
+	cd tests/look && npm ci --no-audit --no-fund && node --test
 
 # Starts a Slurm of its own, as root; not part of `make test`.
 test-farm: build

@@ -102,6 +102,8 @@ if picture looks; then
     grow "look_$look.vdb" cloud --look "$look" --resolution 224
     show "look_$look" "look_$look.vdb" --look "$look" --size 480x270
     files="$files look_$look.png"
+    # The viewer shows them, too.
+    oiiotool "look_$look.png" --resize 240x135 --quality 82 -o "$docs/../apps/look/page/look/$look.jpg"
   done
   padding="" tiles looks.jpg 3x3 $files
 fi

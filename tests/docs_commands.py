@@ -9,6 +9,7 @@ A block after the line <!-- not run: WHY --> is left out.
 """
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -140,9 +141,23 @@ def run(program, examples, page):
         return False
 
 
+def look(program, arguments):
+    """Starts the viewer, and ends it once it has said its address."""
+    with subprocess.Popen([program, "look", "--no-browser", *arguments], stdout=subprocess.PIPE, text=True) as child:
+        address = child.stdout.readline()
+        if not address:
+            return child.wait()
+        print(address, end="")
+        child.send_signal(signal.SIGINT)
+        child.stdout.read()
+    return 0 if address.startswith("http://") else 1
+
+
 def main():
     if sys.argv[1] == "--run":
         program = sys.argv[2]
+        if sys.argv[3:4] == ["look"]:
+            return look(program, small_arguments(sys.argv[3:])[1:])
         os.execv(program, [program, *small_arguments(sys.argv[3:])])
     program, examples = (Path(a).resolve() for a in sys.argv[1:3])
     good = [run(program, examples, Path(page)) for page in sys.argv[3:]]

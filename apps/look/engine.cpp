@@ -178,7 +178,9 @@ void LookEngine::run() {
       asked_.wait(lock, [&] { return stops_ || !requests_.empty() || !wedges_.empty(); });
       if (stops_) return;
       isOutdated_ = false;
-      yields_ = requests_.size() > 1;
+      yields_ = requests_.size() > 1 &&
+                std::any_of(std::next(requests_.begin()), requests_.end(),
+                            [](const LookRequest& waiting) { return !waiting.hasGivenWay; });
       if (!requests_.empty()) {
         request = std::move(requests_.front());
         requests_.pop_front();
@@ -276,7 +278,7 @@ void LookEngine::make(const LookRequest& request) {
     const LookTier& own = isLit ? fine_ : coarse_;
     const int samples = request.plan->picture.render.samples;
     const bool isSoon = isLit && !request.hurries && own.expectedSeconds(pixels * samples) < kSoonSeconds;
-    if (!isSoon) {
+    if (!isSoon && !request.hasGivenWay) {
       const double share =
           isCloud
               ? std::clamp(std::sqrt(kDragSeconds / std::max(own.expectedSeconds(pixels), 1e-9)), 0.25, 1.0)
@@ -290,7 +292,9 @@ void LookEngine::make(const LookRequest& request) {
   } catch (const Cancelled&) {
     const std::lock_guard lock(mutex_);
     // Another page's first picture went before: this goes on afterwards.
-    if (!stops_ && !isOutdated_) requests_.push_back(request);
+    if (stops_ || isOutdated_) return;
+    requests_.push_back(request);
+    requests_.back().hasGivenWay = true;
   } catch (const std::bad_alloc&) {
     sendFault(request.page, request.revision, Error("out of memory; lower the resolution"));
   } catch (const std::exception& error) {

@@ -25,6 +25,8 @@ struct LookRequest {
   /// Only what comes in time: something is being dragged.
   bool hurries = false;
   LookShow show{};
+  /// Gave way to another page's first picture, and does not again to one that did so, too.
+  bool hasGivenWay = false;
 };
 
 /// Many small pictures of what differs in a setting or two.

@@ -96,7 +96,7 @@ export class Stream extends EventTarget {
 }
 
 // While dragging, the next settings wait for the picture of the last ones: else nothing slower than the hand would ever be seen.
-const kLongestWait = 1500;
+const kLongestWait = 4000;
 
 /** Sends settings: one request at a time, the latest wins, and only pictures of the latest are current. */
 export class Sender extends EventTarget {
