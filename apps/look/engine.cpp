@@ -25,6 +25,40 @@ nlohmann::json jsonOf(const Vec3d& v) {
 /// What a drag may take for its picture, seconds.
 constexpr double kDragSeconds = 0.035, kSoonSeconds = 0.12;
 
+/// What a page learns of a picture, whatever it was asked for.
+nlohmann::json describedPicture(const LookTier::Picture& picture) {
+  const Camera& camera = picture.camera;
+  const Vec3d middle(picture.bounds.isEmpty() ? Vec3f{} : picture.bounds.center());
+  const double away = dot(middle - camera.position(), camera.forward());
+  const double distance = away > 0 ? away : length(middle - camera.position());
+  nlohmann::json layers = {"beauty", "depth", "normal", "transmittance", "albedo"};
+  for (const std::string& name : picture.options.lights.names()) layers.push_back("light_" + name);
+  nlohmann::json message = {
+      {"rays", picture.rays},
+      {"rays_per_pixel", double(picture.rays) / (double(picture.image->width) * picture.image->height)},
+      {"voxels", picture.voxelSize > 0 && !picture.bounds.isEmpty()
+                     ? picture.bounds.longestSide() / picture.voxelSize
+                     : 0.0},
+      {"camera",
+       {{"position", jsonOf(camera.position())},
+        {"look_at", jsonOf(camera.position() + camera.forward() * distance)},
+        {"up", jsonOf(camera.up())},
+        {"fov",
+         camera.isOrthographic() ? 0.0 : 2 * std::atan(camera.screenWidth() / 2) * 180 / std::numbers::pi},
+        {"orthographic_width", camera.isOrthographic() ? camera.screenWidth() : 0.0}}},
+      {"layers", layers}};
+  if (picture.options.extinction) message["extinction"] = *picture.options.extinction;
+  if (!picture.bounds.isEmpty())
+    message["bounds"] = {jsonOf(Vec3d(picture.bounds.min)), jsonOf(Vec3d(picture.bounds.max))};
+  if (!picture.options.lights.suns.empty()) {
+    const Vec3f sun = normalize(picture.options.lights.suns[0].direction);
+    const double degrees = 180 / std::numbers::pi;
+    message["sun"] = {std::atan2(sun.x, sun.z) * degrees,
+                      std::asin(std::clamp(sun.y, -1.0f, 1.0f)) * degrees};
+  }
+  return message;
+}
+
 }  // namespace
 
 /// The Run behind pictures of one page: tells it of stages and notes, and learns of newer requests.
@@ -147,6 +181,7 @@ void LookEngine::ask(LookWedge wedge) {
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(wedges_, [&](const LookWedge& older) { return older.page == wedge.page; });
+    if (workingFor_ == wedge.page && isOnWedge_) isOutdated_ = true;
     wedges_.push_back(std::move(wedge));
   }
   asked_.notify_all();
@@ -178,6 +213,7 @@ void LookEngine::run() {
       asked_.wait(lock, [&] { return stops_ || !requests_.empty() || !wedges_.empty(); });
       if (stops_) return;
       isOutdated_ = false;
+      isOnWedge_ = requests_.empty();
       yields_ = requests_.size() > 1 &&
                 std::any_of(std::next(requests_.begin()), requests_.end(),
                             [](const LookRequest& waiting) { return !waiting.hasGivenWay; });
@@ -188,6 +224,7 @@ void LookEngine::run() {
       } else {
         wedge = std::move(wedges_.front());
         wedges_.pop_front();
+        workingFor_ = wedge->page;
       }
     }
     if (request)
@@ -215,47 +252,19 @@ void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const Loo
   const LookTier::Picture picture =
       own.picture(*request.plan, frame, tier == LookPlan::Tier::coarse ? &fine_ : nullptr, work);
   std::string bytes = shownJpeg(*picture.image, request.show, picture.options.screen, isFinal ? 92 : 80);
-  const Camera& camera = picture.camera;
-  const Vec3d middle(picture.bounds.isEmpty() ? Vec3f{} : picture.bounds.center());
-  const double away = dot(middle - camera.position(), camera.forward());
-  const double distance = away > 0 ? away : length(middle - camera.position());
-  nlohmann::json layers = {"beauty", "depth", "normal", "transmittance", "albedo"};
-  for (const std::string& name : picture.options.lights.names()) layers.push_back("light_" + name);
-  nlohmann::json message = {
-      {"type", "picture"},
-      {"revision", request.revision},
-      {"level", level},
-      {"final", isFinal},
-      {"width", frame.width},
-      {"height", frame.height},
-      {"mime", "image/jpeg"},
-      {"milliseconds", 1000 * secondsSince(start)},
-      {"seconds", work.seconds()},
-      {"stage", isFinal                          ? "final"
-                : tier == LookPlan::Tier::coarse ? "coarse"
-                                                 : "fine"},
-      {"rays", picture.rays},
-      {"rays_per_pixel", double(picture.rays) / (double(frame.width) * frame.height)},
-      {"voxels", picture.voxelSize > 0 && !picture.bounds.isEmpty()
-                     ? picture.bounds.longestSide() / picture.voxelSize
-                     : 0.0},
-      {"camera",
-       {{"position", jsonOf(camera.position())},
-        {"look_at", jsonOf(camera.position() + camera.forward() * distance)},
-        {"up", jsonOf(camera.up())},
-        {"fov",
-         camera.isOrthographic() ? 0.0 : 2 * std::atan(camera.screenWidth() / 2) * 180 / std::numbers::pi},
-        {"orthographic_width", camera.isOrthographic() ? camera.screenWidth() : 0.0}}},
-      {"layers", layers}};
-  if (picture.options.extinction) message["extinction"] = *picture.options.extinction;
-  if (!picture.bounds.isEmpty())
-    message["bounds"] = {jsonOf(Vec3d(picture.bounds.min)), jsonOf(Vec3d(picture.bounds.max))};
-  if (!picture.options.lights.suns.empty()) {
-    const Vec3f sun = normalize(picture.options.lights.suns[0].direction);
-    const double degrees = 180 / std::numbers::pi;
-    message["sun"] = {std::atan2(sun.x, sun.z) * degrees,
-                      std::asin(std::clamp(sun.y, -1.0f, 1.0f)) * degrees};
-  }
+  nlohmann::json message = describedPicture(picture);
+  message.update({{"type", "picture"},
+                  {"revision", request.revision},
+                  {"level", level},
+                  {"final", isFinal},
+                  {"width", frame.width},
+                  {"height", frame.height},
+                  {"mime", "image/jpeg"},
+                  {"milliseconds", 1000 * secondsSince(start)},
+                  {"seconds", work.seconds()},
+                  {"stage", isFinal                          ? "final"
+                            : tier == LookPlan::Tier::coarse ? "coarse"
+                                                             : "fine"}});
   const std::lock_guard lock(mutex_);
   const auto found = pages_.find(request.page);
   if (found == pages_.end() || isOutdated_) return;
@@ -279,10 +288,10 @@ void LookEngine::make(const LookRequest& request) {
     const int samples = request.plan->picture.render.samples;
     const bool isSoon = isLit && !request.hurries && own.expectedSeconds(pixels * samples) < kSoonSeconds;
     if (!isSoon && !request.hasGivenWay) {
-      const double share =
-          isCloud
-              ? std::clamp(std::sqrt(kDragSeconds / std::max(own.expectedSeconds(pixels), 1e-9)), 0.25, 1.0)
-              : 0.5;
+      // In steps, so that what needs no march is not marched at another size.
+      constexpr double kSteps = 8;
+      const double fits = std::sqrt(kDragSeconds / own.expectedSeconds(pixels));
+      const double share = isCloud ? std::clamp(std::floor(fits * kSteps) / kSteps, 0.25, 1.0) : 0.5;
       show(request, first, sized(share, 1), 0, false, work);
     }
     if (request.hurries) return;
@@ -319,7 +328,10 @@ void LookEngine::make(LookWedge& wedge) {
       bytes = shownJpeg(*picture.image, wedge.show, picture.options.screen, 88);
     } catch (const Cancelled&) {
       const std::lock_guard lock(mutex_);
-      if (!stops_) wedges_.push_front(std::move(wedge));
+      // It goes on after what was asked for meanwhile, unless its page is gone or has asked for another.
+      const bool isWanted = pages_.contains(wedge.page) &&
+                            std::ranges::find(wedges_, wedge.page, &LookWedge::page) == wedges_.end();
+      if (!stops_ && isWanted) wedges_.push_front(std::move(wedge));
       return;
     } catch (const std::exception& error) {
       message["error"] = error.what();

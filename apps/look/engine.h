@@ -11,38 +11,10 @@
 #include <thread>
 
 #include "apps/look/page.h"
-#include "apps/look/plan.h"
+#include "apps/look/requests.h"
 #include "apps/look/tier.h"
 
 namespace nephele::apps {
-
-/// A picture that a page asks for.
-struct LookRequest {
-  std::string page;
-  std::int64_t revision = 0;
-  std::shared_ptr<const LookPlan> plan;
-  int width = 640, height = 360;
-  /// Only what comes in time: something is being dragged.
-  bool hurries = false;
-  LookShow show{};
-  /// Gave way to another page's first picture, and does not again to one that did so, too.
-  bool hasGivenWay = false;
-};
-
-/// Many small pictures of what differs in a setting or two.
-struct LookWedge {
-  std::string page;
-  std::int64_t revision = 0;
-  struct Cell {
-    std::string label;
-    std::shared_ptr<const LookPlan> plan;
-  };
-  std::vector<Cell> cells;
-  /// Those before it are made.
-  std::size_t next = 0;
-  int width = 320, height = 180;
-  LookShow show{};
-};
 
 /// Makes the pictures of all pages, on one thread that uses all cores: coarse ones first, then finer ones. A
 /// newer request of a page ends the work on its older ones.
@@ -94,6 +66,7 @@ class LookEngine {
   std::atomic<bool> stops_{false};
   // What is worked on.
   std::string workingFor_;
+  bool isOnWedge_ = false;
   std::atomic<bool> isOutdated_{false}, yields_{false};
   // Of the worker alone.
   LookTier coarse_{LookPlan::Tier::coarse}, fine_{LookPlan::Tier::fine}, small_{LookPlan::Tier::coarse};

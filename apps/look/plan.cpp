@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <string_view>
 
+#include "apps/options/common_group.h"
+#include "apps/options/outputs.h"
+
 namespace nephele::apps {
 namespace {
 
@@ -57,6 +60,18 @@ std::string keyOf(const nlohmann::json& settings, const Counts& counts) {
   return key;
 }
 
+/// Pages may set how things look, and nothing else: no file is written but by an export, under a plain name.
+void refuseOthers(const Command& command) {
+  for (const CLI::Option* option : command.app.get_options()) {
+    if (option->count() == 0 || option->get_lnames().empty()) continue;
+    const std::string &name = option->get_lnames().front(), group = option->get_group();
+    const bool isOther = isOutput(*option) || group == kCommonGroup || group == kSeveralGroup ||
+                         name == "cache" || name == "cache-size" || name == "display-server";
+    if (isOther)
+      throw LookFault(command.verb.name, "--" + name + ": is not for the viewer, which writes exports alone");
+  }
+}
+
 }  // namespace
 
 Verb lookCloudVerb(CloudArguments& cloud) {
@@ -84,6 +99,7 @@ std::unique_ptr<LookPlan::Parsed> LookPlan::parsed(Verb verb, const nlohmann::js
     auto result = std::make_unique<Parsed>(std::move(verb));
     for (std::string& argument : argumentsOf(settings)) arguments.push_back(std::move(argument));
     result->command.parse(std::move(arguments));
+    refuseOthers(result->command);
     return result;
   } catch (const std::exception& error) {
     throw LookFault(name, error.what());

@@ -8,18 +8,18 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <set>
 
 #include "apps/look/controls.h"
 #include "apps/look/exports.h"
 #include "apps/look/page_files.inc"
+#include "apps/look/requests.h"
 
 namespace nephele::apps {
 namespace {
 
 // Of requests; pictures go the other way.
 constexpr std::size_t kMostBytes = 1 << 20;
-constexpr int kMostThreads = 32, kMostPorts = 100, kMostCells = 100;
+constexpr int kMostThreads = 32, kMostPorts = 100;
 
 std::string randomWord() {
   constexpr char kLetters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012345678901";
@@ -28,17 +28,6 @@ std::string randomWord() {
   std::string word;
   for (const unsigned char byte : bytes) word += kLetters[byte & 63];
   return word;
-}
-
-bool isPageName(const std::string& text) {
-  return !text.empty() && text.size() <= 32 &&
-         std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c); });
-}
-
-std::string pageOf(const nlohmann::json& body) {
-  const std::string page = body.value("page", "");
-  if (!isPageName(page)) throw LookFault("", "page: must be letters and digits, at most 32");
-  return page;
 }
 
 nlohmann::json errorOf(const std::exception& error) {
@@ -50,62 +39,10 @@ nlohmann::json errorOf(const std::exception& error) {
   return {{"errors", {one}}};
 }
 
-void sizeOf(const nlohmann::json& body, int& width, int& height) {
-  if (!body.contains("size")) return;
-  const auto& size = body["size"];
-  const auto fits = [](const nlohmann::json& n) {
-    return n.is_number_integer() && n.get<std::int64_t>() >= 16 && n.get<std::int64_t>() <= 4096;
-  };
-  if (!size.is_array() || size.size() != 2 || !fits(size[0]) || !fits(size[1]))
-    throw LookFault("", "size: must be two whole numbers from 16 to 4096");
-  width = size[0];
-  height = size[1];
-}
-
-LookShow showOf(const nlohmann::json& body) {
-  LookShow show;
-  if (!body.contains("show")) return show;
-  const auto& given = body["show"];
-  if (!given.is_object()) throw LookFault("", "show: must be an object");
-  const std::string what = given.value("what", "cloud");
-  if (what == "surface")
-    show.what = LookShow::What::surface;
-  else if (what == "checker")
-    show.what = LookShow::What::checker;
-  else if (what != "cloud")
-    throw LookFault("", "show: got '" + what + "', allowed: cloud, surface, checker");
-  show.layer = given.value("layer", "beauty");
-  const std::set<std::string> known{"beauty", "depth", "normal", "transmittance", "albedo"};
-  if (!known.contains(show.layer) && !show.layer.starts_with("light_"))
-    throw LookFault("", "layer: got '" + show.layer +
-                            "', allowed: beauty, depth, normal, transmittance, albedo, light_NAME");
-  show.falseColor = given.value("false_color", false);
-  return show;
-}
-
-std::int64_t revisionOf(const nlohmann::json& body) {
-  return body.contains("revision") && body["revision"].is_number_integer()
-             ? body["revision"].get<std::int64_t>()
-             : 0;
-}
-
-struct Axis {
-  std::string verb, option;
-  std::vector<std::string> values;
-};
-
-Axis axisOf(const nlohmann::json& given) {
-  if (!given.is_object()) throw LookFault("", "wedge: rows and columns must be objects");
-  Axis axis{given.value("verb", ""), given.value("option", ""), {}};
-  if (axis.verb != "cloud" && axis.verb != "render" && axis.verb != "parameters")
-    throw LookFault("", "wedge: verb must be cloud, render or parameters");
-  if (!given.contains("values") || !given["values"].is_array() || given["values"].empty())
-    throw LookFault("", "wedge: there must be values");
-  for (const auto& value : given["values"]) {
-    if (!value.is_string()) throw LookFault("", "wedge: values must be texts");
-    axis.values.push_back(value);
-  }
-  return axis;
+/// Names of files may be in any encoding, but JSON is UTF-8.
+void sendJson(const nlohmann::json& value, httplib::Response& response) {
+  response.set_content(value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
+                       "application/json");
 }
 
 /// Ends all connections to a port of this process; the server would wait for them to say something.
@@ -128,6 +65,14 @@ const char* typeOfFile(const std::string& name) {
   if (name.ends_with(".svg")) return "image/svg+xml";
   if (name.ends_with(".jpg")) return "image/jpeg";
   return "text/html; charset=utf-8";
+}
+
+/// A file of the page, or 404.
+void sendFile(const std::string& name, httplib::Response& response) {
+  for (const PageFile& file : kPageFiles)
+    if (file.name == name)
+      return response.set_content(file.bytes.data(), file.bytes.size(), typeOfFile(name));
+  response.status = 404;
 }
 
 }  // namespace
@@ -193,52 +138,39 @@ void LookServer::route() {
                         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
     if (isFromHere(request)) return httplib::Server::HandlerResponse::Unhandled;
     response.status = 403;
-    response.set_content(
-        "{\"errors\":[{\"verb\":\"\",\"option\":\"\",\"message\":\"not from this page\"}]}\n",
-        "application/json");
+    sendJson(errorOf(Error("not from this page")), response);
     return httplib::Server::HandlerResponse::Handled;
   });
-  server_->set_exception_handler([](const httplib::Request&, httplib::Response& response,
-                                    std::exception_ptr) {
-    response.status = 500;
-    response.set_content(
-        "{\"errors\":[{\"verb\":\"\",\"option\":\"\",\"message\":\"the request could not be answered\"}]}\n",
-        "application/json");
-  });
+  server_->set_exception_handler(
+      [](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+        response.status = 500;
+        sendJson(errorOf(Error("the request could not be answered")), response);
+      });
   const std::string base = "/" + word_ + "/";
-  server_->Get(base + "([a-z_]*\\.?[a-z]*)", [this](const httplib::Request& request,
-                                                    httplib::Response& response) {
-    const std::string name = request.matches[1].length() ? request.matches[1].str() : "index.html";
-    if (name == "controls") {
-      try {
-        response.set_content(controls().dump(), "application/json");
-      } catch (const std::exception& error) {
-        response.status = 422;
-        response.set_content(errorOf(error).dump(), "application/json");
-      }
-      return;
-    }
-    if (name == "stream") return stream(request, response);
-    if (name == "pixel") {
-      const auto number = [&](const char* key) {
-        return parseNumber(request.get_param_value(key)).value_or(-1);
-      };
-      response.set_content(engine_.pixel(request.get_param_value("page"), number("x"), number("y")).dump(),
-                           "application/json");
-      return;
-    }
-    for (const PageFile& file : kPageFiles)
-      if (file.name == name)
-        return response.set_content(file.bytes.data(), file.bytes.size(), typeOfFile(name));
-    response.status = 404;
-  });
-  server_->Get(base + "look/([a-z-]+\\.jpg)",
+  server_->Get(
+      base + "([a-z_]*\\.?[a-z]*)", [this](const httplib::Request& request, httplib::Response& response) {
+        const std::string name = request.matches[1].length() ? request.matches[1].str() : "index.html";
+        if (name == "controls") {
+          try {
+            sendJson(controls(), response);
+          } catch (const std::exception& error) {
+            response.status = 422;
+            sendJson(errorOf(error), response);
+          }
+          return;
+        }
+        if (name == "stream") return stream(request, response);
+        if (name == "pixel") {
+          const auto number = [&](const char* key) {
+            return parseNumber(request.get_param_value(key)).value_or(-1);
+          };
+          return sendJson(engine_.pixel(request.get_param_value("page"), number("x"), number("y")), response);
+        }
+        sendFile(name, response);
+      });
+  server_->Get(base + "(look/[a-z-]+\\.jpg)",
                [](const httplib::Request& request, httplib::Response& response) {
-                 const std::string name = "look/" + request.matches[1].str();
-                 for (const PageFile& file : kPageFiles)
-                   if (file.name == name)
-                     return response.set_content(file.bytes.data(), file.bytes.size(), "image/jpeg");
-                 response.status = 404;
+                 sendFile(request.matches[1].str(), response);
                });
   answer("settings", &LookServer::setSettings);
   answer("wedge", &LookServer::makeWedge);
@@ -264,8 +196,7 @@ void LookServer::answer(const std::string& name, Handler handler) {
                     response.status = 422;
                     result = errorOf(error);
                   }
-                  response.set_content(result.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
-                                       "application/json");
+                  sendJson(result, response);
                 });
 }
 
@@ -274,9 +205,8 @@ void LookServer::stream(const httplib::Request& request, httplib::Response& resp
   const std::shared_ptr<LookPage> page = isPageName(name) ? engine_.open(name) : nullptr;
   if (!page) {
     response.status = 429;
-    return response.set_content(
-        errorOf(Error(fmt::format("at most {} pages at once", LookEngine::kMostPages))).dump(),
-        "application/json");
+    return sendJson(errorOf(Error(fmt::format("at most {} pages at once", LookEngine::kMostPages))),
+                    response);
   }
   constexpr double kHeartbeat = 5;
   response.set_chunked_content_provider(
@@ -305,66 +235,33 @@ nlohmann::json LookServer::controls() const {
           {"saved", savedLooks()}};
 }
 
-std::shared_ptr<const LookPlan> LookServer::planOf(const nlohmann::json& body) const {
-  return std::make_shared<const LookPlan>(options_.subject,
-                                          checkedSettings(body.value("settings", nlohmann::json())));
-}
-
 nlohmann::json LookServer::setSettings(const nlohmann::json& body) {
-  LookRequest request;
-  request.page = pageOf(body);
-  request.revision = revisionOf(body);
-  sizeOf(body, request.width, request.height);
-  request.show = showOf(body);
-  request.hurries = body.value("hurry", false);
-  request.plan = planOf(body);
+  LookRequest request = requestOf(options_.subject, body);
+  const std::int64_t revision = request.revision;
   {
     const std::lock_guard lock(mutex_);
     if (latest_.size() > 4 * LookEngine::kMostPages) latest_.clear();
     latest_[request.page] = request;
   }
-  const std::int64_t revision = request.revision;
   engine_.ask(std::move(request));
   return {{"revision", revision}};
 }
 
 nlohmann::json LookServer::makeWedge(const nlohmann::json& body) {
-  LookWedge wedge;
-  wedge.page = pageOf(body);
-  wedge.revision = revisionOf(body);
-  sizeOf(body, wedge.width, wedge.height);
-  wedge.show = showOf(body);
-  const Axis rows = axisOf(body.value("rows", nlohmann::json()));
-  std::optional<Axis> columns;
-  if (body.contains("columns") && !body["columns"].is_null()) columns = axisOf(body["columns"]);
-  const std::size_t count = rows.values.size() * (columns ? columns->values.size() : 1);
-  if (count > std::size_t(kMostCells))
-    throw LookFault("", fmt::format("wedge: {} pictures, at most {}", count, kMostCells));
-  const LookSettings settings = checkedSettings(body.value("settings", nlohmann::json()));
-  for (const std::string& row : rows.values)
-    for (std::size_t c = 0; c < (columns ? columns->values.size() : 1); ++c) {
-      LookSettings own = settings;
-      own[rows.verb][rows.option] = row;
-      std::string label = rows.option + "=" + row;
-      if (columns) {
-        own[columns->verb][columns->option] = columns->values[c];
-        label += " " + columns->option + "=" + columns->values[c];
-      }
-      wedge.cells.push_back(
-          {label, std::make_shared<const LookPlan>(options_.subject, checkedSettings(own))});
-    }
+  LookWedge wedge = wedgeOf(options_.subject, body);
+  const std::size_t count = wedge.cells.size();
   engine_.ask(std::move(wedge));
   return {{"count", count}};
 }
 
 nlohmann::json LookServer::commandLines(const nlohmann::json& body) {
-  LookExports exports{options_.subject, planOf(body)->settings};
-  sizeOf(body, exports.width, exports.height);
+  LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
+  readSize(body, exports.width, exports.height);
   return {{"lines", exports.typed()}};
 }
 
 nlohmann::json LookServer::recipe(const nlohmann::json& body) {
-  const LookExports exports{options_.subject, planOf(body)->settings};
+  const LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
   if (options_.subject.kind == LookSubject::Kind::script)
     return {{"name", std::filesystem::path(options_.subject.path).filename().string()},
             {"text", exports.script()}};
@@ -372,13 +269,13 @@ nlohmann::json LookServer::recipe(const nlohmann::json& body) {
 }
 
 nlohmann::json LookServer::saveLook(const nlohmann::json& body) {
-  apps::saveLook(body.value("name", ""), planOf(body)->settings);
+  apps::saveLook(body.value("name", ""), planOf(options_.subject, body)->settings);
   return {{"saved", savedLooks()}};
 }
 
 nlohmann::json LookServer::startJob(const nlohmann::json& body) {
-  LookExports exports{options_.subject, planOf(body)->settings};
-  sizeOf(body, exports.width, exports.height);
+  LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
+  readSize(body, exports.width, exports.height);
   const std::string what = body.value("what", ""), file = body.value("file", "");
   const auto within = [&](const std::string& name) {
     return (std::filesystem::path(options_.folder) / name).string();

@@ -62,7 +62,6 @@ class LookServer {
   bool isFromHere(const httplib::Request& request) const;
   void stream(const httplib::Request& request, httplib::Response& response);
   nlohmann::json controls() const;
-  std::shared_ptr<const LookPlan> planOf(const nlohmann::json& body) const;
   nlohmann::json setSettings(const nlohmann::json& body);
   nlohmann::json makeWedge(const nlohmann::json& body);
   nlohmann::json commandLines(const nlohmann::json& body);

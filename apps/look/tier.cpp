@@ -52,12 +52,32 @@ PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
   return keys;
 }
 
-std::shared_ptr<const CloudLevels> LookTier::levels(const LookPlan& plan, Run& run) {
+LookTier::Growing::Growing(const CloudArguments& itsArguments, std::shared_ptr<const Mesh> itsMesh,
+                           LookPlan::Tier tier, const Run& run)
+    : arguments(itsArguments),
+      mesh(std::move(itsMesh)),
+      sources(arguments.sources(*mesh, run)),
+      options(optionsOf(arguments, tier, sources, run)) {}
+
+RenderVolume LookTier::Growing::volume(const LookPlan& plan, Run& run) {
+  VoxelGrid<float> density = makeCloud(*levels, options, run).density;
+  const CloudAdvectionArguments& advection = arguments.advection;
+  std::shared_ptr<const BrickGrid> bricks;
+  if (advection.isAny(sources)) {
+    const VdbGridLabel label{"density", VdbGridInfo::Class::fogVolume, false};
+    bricks = toBricks(advection.carried(toVdb(std::move(density), label), sources, arguments.seed, run));
+  } else {
+    bricks = toBricks(density);
+  }
+  return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
+}
+
+std::unique_ptr<LookTier::Growing> LookTier::grown(const LookPlan& plan, Run& run) {
   const CloudArguments cloud = plan.cloudOf(tier_);
   const PictureStages::Keys keys = plan.keys(tier_);
   const auto mesh = stages_.shape(keys.shape, [&] { return cloud.shapeOf(cloud.shape, run); });
-  FieldSources sources = cloud.sources(*mesh, run);
-  const CloudOptions options = optionsOf(cloud, tier_, sources, run);
+  auto growing = std::make_unique<Growing>(cloud, mesh, tier_, run);
+  const CloudOptions& options = growing->options;
   run.requireMemory(estimatedCloudBytes(*mesh, options),
                     "use larger voxels (a lower --resolution or a larger --voxel-size)");
   constexpr std::size_t kMostReaches = 256;
@@ -65,33 +85,17 @@ std::shared_ptr<const CloudLevels> LookTier::levels(const LookPlan& plan, Run& r
   const float edge = options.edgeThickness.range(Box::everywhere()).max;
   reaches_[keys.shape + keys.levels + keys.volume] =
       fmt::format("reach={:g}", cloudEdgeReach(edge, options.voxelSize));
-  return stages_.levels(keysOf(plan).levels, options, run);
-}
-
-RenderVolume LookTier::cloudVolume(const LookPlan& plan, Run& run) {
-  const CloudArguments cloud = plan.cloudOf(tier_);
-  const auto mesh = stages_.shape(plan.keys(tier_).shape, [&] { return cloud.shapeOf(cloud.shape, run); });
-  FieldSources sources = cloud.sources(*mesh, run);
-  const CloudOptions options = optionsOf(cloud, tier_, sources, run);
-  const auto itsLevels = levels(plan, run);
-  VoxelGrid<float> density = makeCloud(*itsLevels, options, run).density;
-  std::shared_ptr<const BrickGrid> bricks;
-  if (cloud.advection.isAny(sources))
-    bricks = toBricks(
-        cloud.advection.carried(toVdb(std::move(density), {"density", VdbGridInfo::Class::fogVolume, false}),
-                                sources, cloud.seed, run));
-  else
-    bricks = toBricks(density);
-  return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
+  growing->levels = stages_.levels(keysOf(plan).levels, options, run);
+  return growing;
 }
 
 std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookTier* finer, Run& run) {
-  const PictureStages::Keys keys = plan.keys(tier_);
+  const std::string key = plan.keys(tier_).volume;
   if (plan.subject.hasCloud()) {
-    levels(plan, run);
-    return stages_.volume(keys.volume, [&] { return cloudVolume(plan, run); });
+    const std::unique_ptr<Growing> growing = grown(plan, run);
+    return stages_.volume(key, [&] { return growing->volume(plan, run); });
   }
-  return stages_.volume(keys.volume, [&] {
+  return stages_.volume(key, [&] {
     if (finer) return coarser(*finer->volume(plan, nullptr, run), run);
     PictureOptions picture = plan.picture;
     return plan.scene.volume(picture, run);
@@ -112,7 +116,7 @@ LookTier::Picture LookTier::surfacePicture(const LookPlan& plan, const Frame& fr
     }
     if (plan.subject.hasCloud())
       return std::make_shared<const Mesh>(
-          marchingCubes(*toBricks(cloudSurface(*levels(plan, run), run)), 0.0f, run));
+          marchingCubes(*toBricks(cloudSurface(*grown(plan, run)->levels, run)), 0.0f, run));
     const auto density = volume(plan, finer, run);
     return std::make_shared<const Mesh>(marchingCubes(density->density(), 0.5f * density->maxDensity(), run));
   });
@@ -174,7 +178,8 @@ LookTier::Picture LookTier::picture(const LookPlan& plan, const Frame& frame, Lo
   const auto result =
       stages_.picture(key, camera, frame.samples > 0 ? picture.render : picture.marched(camera), run);
   const double seconds = secondsSince(start);
-  if (seconds > 1e-3) secondsPerRay_ = 0.5 * (secondsPerRay_ + seconds / rays);
+  if (seconds > kSecondsPerPicture)
+    secondsPerRay_ = 0.5 * (secondsPerRay_ + (seconds - kSecondsPerPicture) / rays);
   auto image = std::make_shared<Image>(result->image);
   picture.addSky(*image, camera, picture.lights);
   return {image,        camera,

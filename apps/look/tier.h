@@ -39,14 +39,28 @@ class LookTier {
   /// is read from a file. @throws Error; Cancelled.
   Picture picture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
   /// Seconds that so many rays will take, from those before.
-  double expectedSeconds(double rays) const { return rays * secondsPerRay_; }
+  double expectedSeconds(double rays) const { return kSecondsPerPicture + rays * secondsPerRay_; }
 
  private:
   PictureStages::Keys keysOf(const LookPlan& plan) const;
+  /// A cloud on its way from the shape to the density.
+  struct Growing {
+    CloudArguments arguments;
+    std::shared_ptr<const Mesh> mesh;
+    FieldSources sources;
+    CloudOptions options;
+    std::shared_ptr<const CloudLevels> levels{};
+
+    Growing(const CloudArguments& itsArguments, std::shared_ptr<const Mesh> itsMesh, LookPlan::Tier tier,
+            const Run& run);
+    RenderVolume volume(const LookPlan& plan, Run& run);
+  };
+  std::unique_ptr<Growing> grown(const LookPlan& plan, Run& run);
   std::shared_ptr<const RenderVolume> volume(const LookPlan& plan, LookTier* finer, Run& run);
-  std::shared_ptr<const CloudLevels> levels(const LookPlan& plan, Run& run);
-  RenderVolume cloudVolume(const LookPlan& plan, Run& run);
   Picture surfacePicture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
+
+  /// What a march takes however few its rays are; measured.
+  static constexpr double kSecondsPerPicture = 0.01;
 
   LookPlan::Tier tier_;
   PictureStages stages_;

@@ -5,10 +5,9 @@
 #include <filesystem>
 
 #include "apps/app.h"
-#include "apps/look/controls.h"
 #include "apps/look/files_watch.h"
+#include "apps/look/line.h"
 #include "apps/look/server.h"
-#include "apps/options/layer_recipe.h"
 
 namespace nephele::apps {
 namespace {
@@ -43,39 +42,13 @@ void openBrowser(const std::string& address) {
   _exit(1);
 }
 
-/// The file that is looked at; the first argument that is no option and no value of one.
-std::string takeInput(std::vector<std::string>& arguments) {
-  if (arguments.empty() || arguments.front().starts_with('-')) return "";
-  const std::string input = arguments.front();
-  arguments.erase(arguments.begin());
-  return input;
-}
-
 void look(const LookArguments& options, Run& run) {
-  std::vector<std::string> arguments = options.app->remaining();
-  for (const char* name : {"--config", "--look"})
-    if (const CLI::Option* option = options.app->get_option(name); option->count() > 0)
-      arguments.push_back(fmt::format("{}={}", name, option->as<std::string>()));
-  std::string input = takeInput(arguments);
-  if (input.ends_with(".toml")) {
-    arguments.insert(arguments.begin(), {isLayerRecipe(input) ? "--recipe" : "--config", input});
-    input.clear();
-  }
-  LookServerOptions server;
-  server.subject = LookSubject::of(input);
-  std::vector<std::string> others;
-  server.settings = settingsOfLine(server.subject, arguments, others);
-  if (!others.empty())
-    throw CLI::ParseError(
-        fmt::format("'{}' is no option of cloud or render, or a second file", others.front()),
-        CLI::ExitCodes::ExtrasError);
-  try {
-    const LookPlan check(server.subject, server.settings);
-  } catch (const LookFault& fault) {
-    throw CLI::ParseError(fault.what(), CLI::ExitCodes::ValidationError);
-  }
+  const LookLine line = LookLine::of(*options.app);
   if (!std::filesystem::is_directory(options.folder))
     throw Error("--folder: " + options.folder + ": there is no such folder");
+  LookServerOptions server;
+  server.subject = line.subject;
+  server.settings = line.settings;
   server.host = options.host;
   server.port = options.port;
   server.folder = options.folder;

@@ -199,6 +199,26 @@ TEST(LookVerb, IsForItsOwnPageOnly) {
   EXPECT_EQ(viewer.ending(), "");
 }
 
+TEST(LookVerb, LetsNoPageWriteByAnOption) {
+  const test::TemporaryFolder folder;
+  const Viewer viewer(small());
+  const Json ofRender[]{{{"deep", folder.file("x.exr")}},
+                        {{"write-deep-shadow", Json::array({folder.file("x.exr")})}},
+                        {{"stats", folder.file("x.json")}},
+                        {{"display-server", "127.0.0.1"}},
+                        {{"wedge", Json::array({"seed=1-3"})}}};
+  for (const Json& settingsOfRender : ofRender) {
+    EXPECT_EQ(viewer.post("settings", settings(1, Json::object(), settingsOfRender))->status, 422)
+        << settingsOfRender;
+    Json job = settings(1, Json::object(), settingsOfRender);
+    job.update({{"what", "exr"}, {"file", "y.exr"}});
+    EXPECT_EQ(viewer.post("job", job)->status, 422) << settingsOfRender;
+  }
+  EXPECT_EQ(viewer.post("settings", settings(1, {{"cache", folder.file("")}}))->status, 422);
+  EXPECT_EQ(viewer.post("settings", settings(1, {{"output", folder.file("x.vdb")}}))->status, 422);
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
 TEST(LookVerb, OutlivesWhatIsNoBrowser) {
   Viewer viewer(small());
   for (const std::string& garbage : {std::string("\0\1\2\3\xff\xfe", 6), std::string("GET "),
