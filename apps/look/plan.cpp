@@ -143,7 +143,9 @@ CloudArguments LookPlan::cloudOf(Tier tier) const {
 
 PictureOptions LookPlan::pictureOf(Tier tier) const {
   PictureOptions result = picture;
-  if (tier == Tier::coarse) result.lightQuality = Quality::draft;
+  if (tier == Tier::fine) return result;
+  result.lightQuality = Quality::draft;
+  result.render.octaves.cells = kCoarseLightCells;
   return result;
 }
 

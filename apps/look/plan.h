@@ -22,10 +22,10 @@ struct LookPlan {
 
   /// How much work a picture may be.
   enum class Tier {
-    coarse,  ///< Voxels of 1/96 of the longest side at least, light in few directions.
+    coarse,  ///< Voxels of 1/64 of the longest side at least, light in few directions.
     fine     ///< As set.
   };
-  static constexpr int kCoarseVoxels = 96;
+  static constexpr int kCoarseVoxels = 64, kCoarseLightCells = 48;
 
   LookSubject subject;
   LookSettings settings;

@@ -26,8 +26,9 @@ struct Octaves {
   int count = 4;
   /// Of the directions in which the rest is solved for: 4, 6 or 8, that is 24, 48 or 80 of them.
   int order = 6;
-  /// Cells of that lattice along its longest side, about: 72, 84 or 160.
-  int longestSide() const { return order == 4 ? 72 : order == 6 ? 84 : 160; }
+  /// Cells of that lattice along its longest side, about, from 8 on; 0: 72, 84 or 160, as the order is.
+  int cells = 0;
+  int longestSide() const { return cells > 0 ? cells : order == 4 ? 72 : order == 6 ? 84 : 160; }
 
   bool operator==(const Octaves&) const = default;
 };

@@ -51,6 +51,8 @@ MarchIntegrator::MarchIntegrator(std::shared_ptr<const BakedLight> light, const 
 void MarchIntegrator::check(const Octaves& octaves) {
   require(octaves.count >= 1 && octaves.count <= MarchScene::kMostOctaves,
           fmt::format("octaves: expected 1 to {}, got {}", MarchScene::kMostOctaves, octaves.count));
+  require(octaves.cells == 0 || (octaves.cells >= 8 && octaves.cells <= 512),
+          fmt::format("octaves: cells must be 0 or from 8 to 512, got {}", octaves.cells));
 }
 
 void MarchIntegrator::check(const RenderOptions& options) {

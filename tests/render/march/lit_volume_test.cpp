@@ -132,5 +132,24 @@ TEST(LitVolume, HoldsTheShadowsOfObjectsFromPictureToPicture) {
   EXPECT_THROW(lit.render(cameraAt(volume, 0), options), Error);
 }
 
+TEST(LitVolume, TakesACoarserLatticeForScatteredLightWhereThatIsAskedFor) {
+  const RenderVolume volume(test::ball(1.0f, 0.05f));
+  const Medium medium{30.0f};
+  const Camera camera = cameraAt(volume, 20);
+  RenderOptions fine, coarse;
+  fine.octaves.order = coarse.octaves.order = 4;
+  coarse.octaves.cells = 48;
+  const Image a = renderImage(volume, medium, kLights, camera, fine).image;
+  const Image b = renderImage(volume, medium, kLights, camera, coarse).image;
+  double sumA = 0, sumB = 0;
+  for (const float value : a.channel("G").values) sumA += double(value);
+  for (const float value : b.channel("G").values) sumB += double(value);
+  EXPECT_NE(a.channel("G").values, b.channel("G").values);
+  // 3 % of the mean do not show in a picture for a drag, which such lattices are for.
+  EXPECT_NEAR(sumB / sumA, 1, 0.03);
+  coarse.octaves.cells = 7;
+  EXPECT_THROW(renderImage(volume, medium, kLights, camera, coarse), Error);
+}
+
 }  // namespace
 }  // namespace nephele
