@@ -11,7 +11,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/shape/detail/shape_kinds.h"
+#include "nephele/modeling/shape/detail/shape_kernels.h"
 
 namespace nephele {
 namespace detail {

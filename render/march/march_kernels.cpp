@@ -20,7 +20,9 @@
 #include <limits>
 
 #include "nephele/render/march/detail/march_runs.h"
-#include "nephele/render/march/detail/marcher.h"
+#include "nephele/render/march/detail/marcher_light.h"
+#include "nephele/render/march/detail/marcher_record.h"
+#include "nephele/render/march/detail/marcher_steps.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {

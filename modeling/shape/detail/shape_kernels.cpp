@@ -1,6 +1,6 @@
 // Loops over lanes, compiled from the formulas for one point once for each instruction set, of which Highway
 // chooses one when the program runs.
-#include "nephele/modeling/shape/detail/shape_kinds.h"
+#include "nephele/modeling/shape/detail/shape_kernels.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nephele/modeling/shape/detail/shape_kernels.cpp"

@@ -1,58 +1,16 @@
 #pragma once
 
-#include <hwy/base.h>
-
 #include <cmath>
 #include <variant>
 
 #include "nephele/modeling/base/math.h"
-#include "nephele/modeling/field/scratch.h"
+#include "nephele/modeling/shape/detail/lane_math.h"
 
 /// The shapes of shapes.h at one point: plain code that is the truth, and that compilers turn into lane code.
 ///
 /// at<true> also writes the gradient. Everything is selection instead of branches, so that loops over points
 /// become vector code; nothing is fused, so that all instruction sets give the same bits.
 namespace nephele::detail {
-
-HWY_INLINE float larger(float a, float b) {
-  return a > b ? a : b;
-}
-HWY_INLINE float smaller(float a, float b) {
-  return a < b ? a : b;
-}
-HWY_INLINE float magnitude(float a) {
-  return a < 0 ? -a : a;
-}
-HWY_INLINE float root(float x, float y, float z) {
-  return std::sqrt(x * x + y * y + z * z);
-}
-/// 1 / v, or 0 for 0.
-HWY_INLINE float inverseOrZero(float v) {
-  return v > 0 ? 1 / v : 0.0f;
-}
-
-/// `radius` less the length of (x, y, z), the way from what is rounded to the point.
-template <bool kGrad>
-HWY_INLINE float rounded(float radius, float x, float y, float z, float& gx, float& gy, float& gz) {
-  const float d = root(x, y, z);
-  if constexpr (kGrad) {
-    const float s = -inverseOrZero(d);
-    gx = s * x, gy = s * y, gz = s * z;
-  }
-  return radius - d;
-}
-
-/// (x, y, z) along an axis and away from it.
-struct AxisWay {
-  float h, rx, ry, rz, r;
-
-  HWY_INLINE AxisWay(const Vec3f& axis, float x, float y, float z)
-      : h(x * axis.x + y * axis.y + z * axis.z),
-        rx(x - h * axis.x),
-        ry(y - h * axis.y),
-        rz(z - h * axis.z),
-        r(root(rx, ry, rz)) {}
-};
 
 struct SphereShape {
   Vec3f center;
@@ -185,11 +143,5 @@ struct EllipsoidShape {
 
 using ShapeKind =
     std::variant<SphereShape, BoxShape, PlaneShape, TorusShape, CapsuleShape, ConeShape, EllipsoidShape>;
-
-/// Values at the points of a block, by the best instruction set of the machine; lanes up to the padded count.
-void shapeLanes(const ShapeKind& kind, const PointBlock& points, float* values);
-/// The same values bit for bit, with gradients.
-void shapeGradLanes(const ShapeKind& kind, const PointBlock& points, float* values,
-                    const BlockLanes<3>& grads);
 
 }  // namespace nephele::detail

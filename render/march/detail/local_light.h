@@ -10,7 +10,9 @@
 
 #include "hwy/contrib/math/math-inl.h"
 #include "nephele/render/light/light_volume.h"
-#include "nephele/render/march/detail/march_samples.h"
+#include "nephele/render/march/detail/march_bricks.h"
+#include "nephele/render/march/detail/march_coded_bricks.h"
+#include "nephele/render/march/detail/march_lattice.h"
 #include "nephele/render/march/march_kernels.h"
 
 /// Lights at a place, as the march sees them a vector of steps at a time.

@@ -1,0 +1,69 @@
+// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+#if defined(NEPHELE_MARCHER_RECORD) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHELE_MARCHER_RECORD
+#undef NEPHELE_MARCHER_RECORD
+#else
+#define NEPHELE_MARCHER_RECORD
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nephele/render/march/detail/marcher.h"
+
+/// What a Marcher hides behind holdouts, and what it records for deep pictures.
+HWY_BEFORE_NAMESPACE();
+namespace nephele::HWY_NAMESPACE {
+
+template <int kColours>
+inline void Marcher<kColours>::hold(float before, const float* after, int used) {
+  for (int i = 0; i != used; ++i) {
+    const float begin = ray_.start + begin_[i];
+    seen_[i] = ray_.holdout.seen(begin * ray_.cosine, (begin + ds_[i]) * ray_.cosine, after[i] - before,
+                                 holdoutCursor_);
+    for (int c = 0; c != 3; ++c) {
+      const float share = scene_.extinctionColour[c];
+      result_.heldOpacity[c] += seen_[i] * (std::exp(-std::min(before * share, 80.0f)) -
+                                            std::exp(-std::min(after[i] * share, 80.0f)));
+    }
+    before = after[i];
+    if (std::isinf(result_.distance) && isVisible(result_.heldOpacity)) result_.distance = ray_.start + s_[i];
+  }
+  for (int i = used; i != kBlock; ++i) seen_[i] = seen_[used - 1];
+  isHidden_ = seen_[used - 1] <= scene_.cutoff;
+}
+
+template <int kColours>
+inline void Marcher<kColours>::mark() {
+  readLight();
+  const MarchResult before = result_;
+  const LitSteps<kColours> waiting = lit_;
+  Floats sums[kMostSums];
+  std::copy_n(sums_, sumCount(), sums);
+  lightAll();
+  addSums(result_);
+  record_->marks.push_back({record_->steps.size(), result_});
+  result_ = before;
+  lit_ = waiting;
+  std::copy_n(sums, sumCount(), sums_);
+}
+
+template <int kColours>
+inline void Marcher<kColours>::record(float before, const float* after, int used) {
+  mark();
+  float opacity = record_->steps.empty() ? 0.0f : record_->steps.back().opacity;
+  for (int i = 0; i != used; ++i) {
+    if (after[i] == before && !scene_.emission.table) continue;
+    const float gain = scene_.meanOpacity(after[i]) - scene_.meanOpacity(before);
+    opacity = isHeld_ ? opacity + seen_[i] * gain : scene_.meanOpacity(after[i]);
+    record_->steps.push_back({begin_[i], begin_[i] + ds_[i], opacity});
+    before = after[i];
+  }
+}
+
+}  // namespace nephele::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

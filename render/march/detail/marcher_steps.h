@@ -1,0 +1,146 @@
+// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+#if defined(NEPHELE_MARCHER_STEPS) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHELE_MARCHER_STEPS
+#undef NEPHELE_MARCHER_STEPS
+#else
+#define NEPHELE_MARCHER_STEPS
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "nephele/render/march/detail/marcher.h"
+
+/// How a Marcher collects steps and adds their opacity.
+HWY_BEFORE_NAMESPACE();
+namespace nephele::HWY_NAMESPACE {
+
+template <int kColours>
+inline bool Marcher<kColours>::take(float start, float ds, int count, float density) {
+  const Lanes d;
+  float begin = start;
+  start += ray_.jitter * ds;
+  while (count > 0) {
+    if (density >= 0 && !std::exchange(someKnown_, true)) std::fill_n(known_, kBlock, -1.0f);
+    // Whole vectors: the processor would wait long before it loads one that was stored in parts.
+    for (int i = count_ / kLanes * kLanes; i < std::min(count_ + count, kBlock); i += kLanes) {
+      const Floats index = hn::Iota(d, float(i - count_));
+      const auto isNew = hn::Ge(index, hn::Zero(d));
+      const auto put = [&](Floats values, float* block) HWY_ATTR {
+        hn::Store(hn::IfThenElse(isNew, values, hn::Load(d, block + i)), d, block + i);
+      };
+      put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), s_);
+      put(hn::Set(d, ds), ds_);
+      if (needsBegin_) put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), begin_);
+      if (someKnown_) put(hn::Set(d, density), known_);
+    }
+    const int taken = std::min(count, kBlock - count_);
+    count_ += taken;
+    count -= taken;
+    start += float(taken) * ds;
+    begin += float(taken) * ds;
+    if (count_ == kBlock && (!flush() || isHidden_)) return false;
+  }
+  return true;
+}
+
+template <int kColours>
+inline bool Marcher<kColours>::take(const MarchStep& step) {
+  jitter_ = 0.5f;
+  s_[count_] = step.place;
+  begin_[count_] = step.begin;
+  ds_[count_] = step.length;
+  known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
+  someKnown_ = true;
+  return ++count_ != kBlock || (flush() && !isHidden_);
+}
+
+template <int kColours>
+inline bool Marcher<kColours>::flush() {
+  const Lanes d;
+  // Of whole vectors.
+  const int used = count_, end = (used + kLanes - 1) / kLanes * kLanes;
+  if (used != end) repeatLast();
+  count_ = 0;
+  result_.samples += std::uint32_t(used);
+
+  // Optical depths of the steps, and behind them.
+  alignas(64) float own[kBlock], after[kBlock];
+  Places places[kBlock / kLanes];
+  const bool needsLookUp = !someKnown_ || someUnknown(end);
+  if (needsLookUp) locateAll(scene_.density, ray_.density, end / kLanes, s_, places);
+  readLight();
+  if (needsLookUp) readAll(scene_.density, end / kLanes, places, own);
+  if (std::exchange(someKnown_, false)) takeKnown(end, needsLookUp, own);
+  Floats most = hn::Zero(d);
+  for (int i = 0; i != end; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
+  if (!scene_.emission.table && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
+  const float before = depth_;
+  Floats behind = hn::Set(d, depth_);
+  for (int i = 0; i != end; i += kLanes) {
+    const Floats depth =
+        hn::Mul(hn::Mul(hn::Load(d, own + i), hn::Set(d, scene_.extinction)), hn::Load(d, ds_ + i));
+    const Floats sums = runningSum(depth, behind);
+    behind = broadcastLast(sums);
+    hn::Store(depth, d, own + i);
+    hn::Store(sums, d, after + i);
+  }
+  depth_ = hn::GetLane(behind);
+  if (!isHeld_ && before <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
+    int first = 0;
+    while (after[first] <= detail::kVisibleDepth) ++first;
+    result_.distance = ray_.start + s_[first];
+  }
+  if (isHeld_) hold(before, after, used);
+  if (record_) record(before, after, used);
+
+  for (int i = 0; i != end; i += kLanes) {
+    LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
+    weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
+          steps);
+    if (lit_.empty() && hn::AllTrue(d, hn::Gt(steps.weightOfAll(), hn::Zero(d)))) {
+      light(steps);
+    } else {
+      lit_.add(steps);
+      if (lit_.full()) light(lit_.take());
+    }
+  }
+  return *std::max_element(through_, through_ + kColours) > scene_.cutoff;
+}
+
+template <int kColours>
+inline void Marcher<kColours>::repeatLast() {
+  const Lanes d;
+  const Floats s = hn::Set(d, s_[count_ - 1]), known = hn::Set(d, known_[count_ - 1]);
+  const int i = count_ / kLanes * kLanes;
+  const auto isUsed = hn::Lt(hn::Iota(d, float(i)), hn::Set(d, float(count_)));
+  hn::Store(hn::IfThenElse(isUsed, hn::Load(d, s_ + i), s), d, s_ + i);
+  hn::Store(hn::IfThenElseZero(isUsed, hn::Load(d, ds_ + i)), d, ds_ + i);
+  hn::Store(hn::IfThenElse(isUsed, hn::Load(d, known_ + i), known), d, known_ + i);
+}
+
+template <int kColours>
+inline bool Marcher<kColours>::someUnknown(int end) const {
+  const Lanes d;
+  Floats least = hn::Load(d, known_);
+  for (int i = kLanes; i < end; i += kLanes) least = hn::Min(least, hn::Load(d, known_ + i));
+  return !hn::AllTrue(d, hn::Ge(least, hn::Zero(d)));
+}
+
+template <int kColours>
+inline void Marcher<kColours>::takeKnown(int end, bool wereLookedUp, float* density) {
+  const Lanes d;
+  for (int i = 0; i != end; i += kLanes) {
+    const Floats known = hn::Load(d, known_ + i);
+    const Floats other = wereLookedUp ? hn::Load(d, density + i) : known;
+    hn::Store(hn::IfThenElse(hn::Ge(known, hn::Zero(d)), known, other), d, density + i);
+  }
+}
+
+}  // namespace nephele::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
