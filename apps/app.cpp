@@ -12,6 +12,7 @@
 #include "apps/detail/call_sheet.h"
 #include "apps/detail/command.h"
 #include "apps/detail/several_calls.h"
+#include "apps/detail/typed_line.h"
 #include "apps/manual/man_page.h"
 #include "apps/options/config_file.h"
 #include "apps/options/first_day.h"
@@ -25,23 +26,8 @@
 namespace nephele::apps {
 namespace {
 
-std::string quoted(const std::string& argument) {
-  const bool plain =
-      !argument.empty() && argument.find_first_of(" \t\n'\"\\$*?&;|<>()#") == std::string::npos;
-  if (plain) return argument;
-  std::string result = "'";
-  for (const char c : argument) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
-
-std::string joined(std::span<const std::string> arguments) {
-  std::string line;
-  for (const std::string& argument : arguments) line += (line.empty() ? "" : " ") + quoted(argument);
-  return line;
-}
-
 std::string commandLineOf(int argc, char** argv) {
-  return "nephele " + joined(std::vector<std::string>(argv + 1, argv + argc));
+  return "nephele " + typedLine(std::vector<std::string>(argv + 1, argv + argc));
 }
 
 void writeStatistics(const std::string& path, const nlohmann::json& statistics) {
@@ -220,7 +206,7 @@ Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<st
   arguments = withCurrentNames(name, withFilesAfterDashes(std::move(arguments)), note);
   Line line = lineOf(command, arguments, withSettings);
   const std::vector<std::string> settings = withSettings(arguments);
-  line.configOptions = joined(std::span(settings).subspan(arguments.size()));
+  line.configOptions = typedLine(std::span(settings).subspan(arguments.size()));
   command.parse(line.first());
   return line;
 }
@@ -302,7 +288,7 @@ nlohmann::json callVerb(const std::string& name, std::vector<std::string> argume
   const auto verb = std::ranges::find(verbs, name, &Verb::name);
   require(verb != verbs.end(), "there is no verb '" + name + "'");
   Command command(*verb);
-  const std::string commandLine = "nephele " + name + " " + joined(arguments);
+  const std::string commandLine = "nephele " + name + " " + typedLine(arguments);
   Line line = parsedLine(command, verbs, std::move(arguments), [](const std::string&) {});
   const std::unique_ptr<ProgramRun> run = makeRun(name, command.options);
   run->commandLine = commandLine;

@@ -2,19 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <regex>
+#include <map>
 #include <set>
 #include <string_view>
 
 #include "apps/detail/command.h"
 #include "apps/look/plan.h"
 #include "apps/looks.h"
+#include "apps/manual/option_table.h"
 #include "apps/options/common_group.h"
 #include "apps/options/config_file.h"
 #include "apps/options/expression_names.h"
 #include "apps/options/first_day.h"
 #include "apps/options/old_names.h"
-#include "apps/options/outputs.h"
 #include "nephele/modeling/felt/program.h"
 
 namespace nephele::apps {
@@ -82,108 +82,82 @@ const std::set<std::string> kNotShown{"size",          "crop",
                                       "spp",           "noise-speed",
                                       "noise-period",  "detail"};
 
-std::string typeOf(const CLI::Option& option, bool& isField) {
-  std::string word = option.get_type_name();
-  if (const std::size_t bar = word.find("|FIELD"); bar != std::string::npos) {
-    isField = true;
-    word = word.substr(0, bar);
-  }
-  if (option.get_items_expected_max() == 0) return "flag";
-  word = word.substr(0, word.find(':'));
-  if (word == "NUMBER" || word == "STOPS" || word == "DEGREES" || word.starts_with("NUMBER["))
-    return "number";
-  if (word == "COUNT") return "count";
-  if (word == "LENGTH") return "length";
-  if (word == "FREQUENCY") return "frequency";
-  if (word == "PERCENT") return "percent";
-  if (word == "FILE" || word == "FOLDER") return "file";
-  if (word == "R,G,B") return "color";
-  if (word == "X,Y,Z") return "vector";
-  if (word == "AZIMUTH,ELEVATION") return "angles";
-  static const std::regex choices("[a-z0-9_]+(\\|[a-z0-9_]+)+");
-  return std::regex_match(word, choices) ? "choice" : "text";
+bool isField(const OptionRow& option) {
+  return option.type.ends_with("|FIELD");
 }
 
-nlohmann::json controlOf(const CLI::Option& option, const std::string& verb, bool isFirstDay) {
-  bool isField = false;
-  const std::string name = option.get_lnames().front(), type = typeOf(option, isField);
-  nlohmann::json control = {{"name", name},
-                            {"verb", verb},
-                            {"help", option.get_description()},
-                            {"default", option.get_default_str()},
-                            {"type", type},
-                            {"is_field", isField},
-                            {"form", option.get_type_name()},
-                            {"repeats", option.get_items_expected_max() > 1},
-                            {"first_day", isFirstDay}};
-  if (type == "choice") {
-    const std::string words = option.get_type_name();
-    for (std::size_t begin = 0; begin <= words.size();) {
-      const std::size_t end = std::min(words.find('|', begin), words.size());
-      control["choices"].push_back(words.substr(begin, end - begin));
-      begin = end + 1;
-    }
-  }
-  const auto slider = std::ranges::find(kSliders, std::string_view(name), &Slider::name);
-  if (slider != kSliders.end()) {
-    control["unit"] = slider->unit;
-    control["low"] = slider->low;
-    control["high"] = slider->high;
-    control["step"] = slider->step;
-    control["logarithmic"] = slider->isLogarithmic;
-  }
-  const auto namesIn = [&](const std::set<CLI::Option*>& others) {
-    auto names = nlohmann::json::array();
-    for (const CLI::Option* other : others)
-      if (!other->get_lnames().empty()) names.push_back(other->get_lnames().front());
-    return names;
-  };
-  control["excludes"] = namesIn(option.get_excludes());
-  control["needs"] = namesIn(option.get_needs());
+/// The type of a control; fields are of the type of what varies.
+std::string typeOf(const OptionRow& option) {
+  if (option.isFlag) return "flag";
+  if (!option.choices().empty()) return "choice";
+  const std::string word = option.type.substr(0, option.type.find_first_of(":|["));
+  static const std::map<std::string, std::string> types{
+      {"NUMBER", "number"}, {"STOPS", "number"},  {"DEGREES", "number"},
+      {"COUNT", "count"},   {"LENGTH", "length"}, {"PERCENT", "percent"},
+      {"FILE", "file"},     {"FOLDER", "file"},   {"FREQUENCY", "frequency"},
+      {"R,G,B", "color"},   {"X,Y,Z", "vector"},  {"AZIMUTH,ELEVATION", "angles"}};
+  const auto known = types.find(word);
+  const bool isWhole = word == option.type || option.type[word.size()] != '|' || isField(option);
+  return known != types.end() && isWhole ? known->second : "text";
+}
+
+nlohmann::json controlOf(const OptionRow& option, const std::string& verb, bool isFirstDay) {
+  nlohmann::json control = {{"name", option.name},     {"verb", verb},
+                            {"help", option.help},     {"default", option.standard},
+                            {"type", typeOf(option)},  {"is_field", isField(option)},
+                            {"form", option.type},     {"repeats", option.repeats},
+                            {"first_day", isFirstDay}, {"excludes", option.excludes},
+                            {"needs", option.needs}};
+  if (const auto choices = option.choices(); !choices.empty()) control["choices"] = choices;
+  const auto slider = std::ranges::find(kSliders, std::string_view(option.name), &Slider::name);
+  if (slider != kSliders.end())
+    control.update({{"unit", slider->unit},
+                    {"low", slider->low},
+                    {"high", slider->high},
+                    {"step", slider->step},
+                    {"logarithmic", slider->isLogarithmic}});
   return control;
 }
 
-void addGroups(const std::string& verb, nlohmann::json& groups) {
-  const Table table(verb);
-  std::set<std::string> taken;
+bool isShown(const OptionRow& option, const std::string& verb) {
+  const bool isOfCloudsToo = verb == "render" && option.name == "seed";
+  return !option.isInput && !option.isOutput && !option.group.empty() && option.group != kCommonGroup &&
+         option.group != kSeveralGroup && !kNotShown.contains(option.name) && !isOfCloudsToo;
+}
+
+/// Those of the first day in their groups, then the others.
+void addGroups(const Verb& verb, nlohmann::json& groups) {
+  std::vector<OptionRow> rows = optionTable(verb);
+  std::erase_if(rows, [&](const OptionRow& row) { return !isShown(row, verb.name); });
   for (const FirstDay& day : firstDays()) {
-    if (day.verb != verb || day.group == "Files" || day.group == "Sequences and wedges") continue;
+    if (day.verb != verb.name || day.group == "Files" || day.group == "Sequences and wedges") continue;
     auto controls = nlohmann::json::array();
     for (const std::string_view name : day.options) {
-      const CLI::Option* option = table.command.app.get_option_no_throw(std::string(name));
-      if (!option || option->get_lnames().empty() || kNotShown.contains(option->get_lnames().front()))
-        continue;
-      controls.push_back(controlOf(*option, verb, true));
-      taken.insert(option->get_lnames().front());
+      const auto row = std::ranges::find(rows, name.substr(2), &OptionRow::name);
+      if (row == rows.end()) continue;
+      controls.push_back(controlOf(*row, verb.name, true));
+      rows.erase(row);
     }
-    groups.push_back({{"name", day.group}, {"verb", verb}, {"controls", controls}});
+    groups.push_back({{"name", day.group}, {"verb", verb.name}, {"controls", controls}});
   }
   auto rest = nlohmann::json::array();
-  for (const CLI::Option* option : table.command.app.get_options()) {
-    if (option->get_lnames().empty() || option->get_positional() || isOutput(*option)) continue;
-    const std::string name = option->get_lnames().front(), group = option->get_group();
-    const bool isOfCloudsToo = verb == "render" && name == "seed";
-    if (group.empty() || group == kCommonGroup || group == kSeveralGroup || taken.contains(name) ||
-        kNotShown.contains(name) || isOfCloudsToo)
-      continue;
-    rest.push_back(controlOf(*option, verb, false));
-  }
-  groups.push_back({{"name", verb == "cloud" ? "More of the cloud" : "More of the picture"},
-                    {"verb", verb},
-                    {"controls", rest}});
+  for (const OptionRow& row : rows) rest.push_back(controlOf(row, verb.name, false));
+  const std::string name = verb.name == "cloud" ? "More of the cloud" : "More of the picture";
+  groups.push_back({{"name", name}, {"verb", verb.name}, {"controls", rest}});
 }
 
 std::vector<std::string> verbNames() {
-  return {"cloud", "render", "turntable", "levelset",  "advect", "wisps",
-          "mesh",  "cut",    "transfer",  "transform", "info",   "felt"};
+  std::vector<std::string> names;
+  for (const Verb& verb : allVerbs()) names.push_back(verb.name);
+  return names;
 }
 
 }  // namespace
 
 nlohmann::json lookControls(const LookSubject& subject) {
   auto groups = nlohmann::json::array();
-  if (subject.hasCloud()) addGroups("cloud", groups);
-  addGroups("render", groups);
+  if (subject.hasCloud()) addGroups(cloudVerb(), groups);
+  addGroups(renderVerb(), groups);
   // What is needed first comes first, of both.
   std::stable_sort(groups.begin(), groups.end(), [](const nlohmann::json& a, const nlohmann::json& b) {
     const auto isMore = [](const nlohmann::json& group) {

@@ -9,6 +9,7 @@
 #include <regex>
 #include <sstream>
 
+#include "apps/detail/typed_line.h"
 #include "nephele/levelset/io/output_file.h"
 
 namespace nephele::apps {
@@ -52,21 +53,6 @@ std::filesystem::path folderOfLooks() {
 
 }  // namespace
 
-std::string typedLine(const std::vector<std::string>& words) {
-  std::string line = "nephele";
-  for (const std::string& word : words) {
-    const bool isPlain = !word.empty() && word.find_first_of(" \t\n'\"\\$*?&;|<>()#`") == std::string::npos;
-    std::string safe = word;
-    if (!isPlain) {
-      safe = "'";
-      for (const char c : word) safe += c == '\'' ? std::string("'\\''") : std::string(1, c);
-      safe += "'";
-    }
-    line += " " + safe;
-  }
-  return line;
-}
-
 std::vector<std::string> LookExports::cloudLine(const std::string& output) const {
   std::vector<std::string> line{"cloud"};
   LookSettings::value_type own = settings["cloud"];
@@ -94,10 +80,10 @@ std::vector<std::string> LookExports::pictureLine(const std::string& verb, const
 
 std::vector<std::string> LookExports::typed() const {
   std::vector<std::string> lines;
-  if (subject.hasCloud()) lines.push_back(typedLine(cloudLine("cloud.vdb")));
+  if (subject.hasCloud()) lines.push_back("nephele " + typedLine(cloudLine("cloud.vdb")));
   std::vector<std::string> picture = pictureLine("render", "cloud.vdb");
   picture.insert(picture.end(), {"-o", "cloud.exr", "--preview", "cloud.png"});
-  lines.push_back(typedLine(picture));
+  lines.push_back("nephele " + typedLine(picture));
   return lines;
 }
 

@@ -27,9 +27,6 @@ struct LookExports {
   std::string script() const;
 };
 
-/// One line as one would type it in a shell.
-std::string typedLine(const std::vector<std::string>& words);
-
 /// Where looks are saved by name: settings that the user has kept. @throws Error where that cannot be.
 nlohmann::json savedLooks();
 void saveLook(const std::string& name, const LookSettings& settings);

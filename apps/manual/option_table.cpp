@@ -1,5 +1,6 @@
 #include "apps/manual/option_table.h"
 
+#include <set>
 #include <sstream>
 
 #include "apps/detail/command.h"
@@ -7,6 +8,13 @@
 
 namespace nephele::apps {
 namespace {
+
+std::vector<std::string> optionNamesOf(const std::set<CLI::Option*>& options) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : options)
+    if (!option->get_lnames().empty()) names.push_back(option->get_lnames().front());
+  return names;
+}
 
 void add(const CLI::App& app, std::vector<OptionRow>& rows) {
   for (const CLI::Option* option : app.get_options()) {
@@ -17,7 +25,8 @@ void add(const CLI::App& app, std::vector<OptionRow>& rows) {
     const bool isFlag = option->get_items_expected_max() == 0;
     rows.push_back({name, shorts.empty() ? "" : "-" + shorts.front(), isFlag ? "" : option->get_type_name(),
                     option->get_default_str(), option->get_description(), option->get_group(), isInput,
-                    isFlag, isOutput(*option), option->get_required(), option->get_items_expected_max() > 1});
+                    isFlag, isOutput(*option), option->get_required(), option->get_items_expected_max() > 1,
+                    optionNamesOf(option->get_excludes()), optionNamesOf(option->get_needs())});
   }
   for (const CLI::App* group :
        app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))

@@ -22,6 +22,8 @@ struct OptionRow {
   bool isInput = false, isFlag = false, isOutput = false, isRequired = false;
   /// It may be given several times.
   bool repeats = false;
+  /// Names of options that do not go with it, and of those that it goes with alone.
+  std::vector<std::string> excludes{}, needs{};
 
   /// The words that it takes, if these are all.
   std::vector<std::string> choices() const;
