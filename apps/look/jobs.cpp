@@ -40,11 +40,7 @@ int LookJobs::start(const std::string& what, std::vector<std::vector<std::string
   const int id = ++last_;
   jobs_[id].thread =
       std::thread([this, id, what, lines = std::move(lines), temporary = std::move(temporary)] {
-        run(id, what, lines);
-        for (const std::string& path : temporary) {
-          std::error_code ignored;
-          std::filesystem::remove(path, ignored);
-        }
+        run(id, what, lines, temporary);
         const std::lock_guard done(mutex_);
         jobs_[id].isDone = true;
       });
@@ -60,7 +56,8 @@ bool LookJobs::stop(int id) {
   return true;
 }
 
-void LookJobs::run(int id, const std::string& what, const std::vector<std::vector<std::string>>& lines) {
+void LookJobs::run(int id, const std::string& what, const std::vector<std::vector<std::string>>& lines,
+                   const std::vector<std::string>& temporary) {
   const auto say = [&](const char* state, double fraction, const std::string& message) {
     tell_({{"type", "job"},
            {"id", id},
@@ -68,6 +65,13 @@ void LookJobs::run(int id, const std::string& what, const std::vector<std::vecto
            {"state", state},
            {"fraction", fraction},
            {"message", message}});
+  };
+  const auto end = [&](const char* state, double fraction, const std::string& message) {
+    for (const std::string& path : temporary) {
+      std::error_code ignored;
+      std::filesystem::remove(path, ignored);
+    }
+    say(state, fraction, message);
   };
   say("running", 0, "");
   std::string last;
@@ -80,10 +84,10 @@ void LookJobs::run(int id, const std::string& what, const std::vector<std::vecto
       const std::lock_guard lock(mutex_);
       return jobs_[id].isStopped;
     }();
-    if (isStopped) return say("stopped", 0, last);
-    if (code != 0) return say("failed", 0, last);
+    if (isStopped) return end("stopped", 0, last);
+    if (code != 0) return end("failed", 0, last);
   }
-  say("done", 1, last);
+  end("done", 1, last);
 }
 
 int LookJobs::runLine(int id, const std::vector<std::string>& line,

@@ -35,7 +35,8 @@ class LookJobs {
     bool isStopped = false, isDone = false;
     std::thread thread;
   };
-  void run(int id, const std::string& what, const std::vector<std::vector<std::string>>& lines);
+  void run(int id, const std::string& what, const std::vector<std::vector<std::string>>& lines,
+           const std::vector<std::string>& temporary);
   int runLine(int id, const std::vector<std::string>& line, const std::function<void(double)>& advance,
               std::string& last);
 
