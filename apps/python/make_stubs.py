@@ -69,11 +69,10 @@ def word(name, functions):
 
 
 def option_type(option):
-    words = option["type"].split("|")
     if option["is_flag"]:
         return "bool"
-    if len(words) > 1 and all(re.fullmatch(r"[a-z0-9_-]+", word) for word in words):
-        return "Literal[" + ", ".join(f'"{word}"' for word in words) + "]"
+    if option["choices"]:
+        return "Literal[" + ", ".join(f'"{word}"' for word in option["choices"]) + "]"
     return {"COUNT": "int", "NUMBER": "Number", "LENGTH": "Number"}.get(option["type"], "Any")
 
 

@@ -86,7 +86,7 @@ py::dict optionsOf(const std::string& name) {
       options.append(py::dict("name"_a = row.name, "type"_a = row.type, "default"_a = row.standard,
                               "help"_a = row.help, "group"_a = row.group, "is_input"_a = row.isInput,
                               "is_flag"_a = row.isFlag, "is_output"_a = row.isOutput,
-                              "repeats"_a = row.repeats));
+                              "repeats"_a = row.repeats, "choices"_a = row.choices()));
     return py::dict("summary"_a = verb.summary, "example"_a = verb.example, "options"_a = options);
   }
   throw py::value_error("there is no verb '" + name + "'");

@@ -160,7 +160,7 @@ Typed Conversion::operator()(const py::handle& object, const std::string& what) 
   const felt::Diagnostic& fault = error.diagnostics().front();
   using felt::Code;
   std::string text = fault.message;
-  if (!fault.hint.empty()) text += (fault.hint.find('\n') == std::string::npos ? "; " : "; ") + fault.hint;
+  if (!fault.hint.empty()) text += "; " + fault.hint;
   for (const Code code : {Code::noSuchCall, Code::ambiguousCall, Code::wrongType, Code::unknownParameter})
     if (fault.code == code) throw py::type_error(text);
   throw Error(text.starts_with(who) ? text : who + ": " + text);
@@ -267,9 +267,9 @@ py::dict runScript(const std::string& text, const std::map<std::string, std::str
   try {
     watched(watch, progress, [&] {
       const felt::Program program(name, text, apps::feltFunctions(), apps::namesOfPlace(0, 0).given);
+      std::vector<std::string> known;
+      for (const felt::ScriptParameter& parameter : program.parameters()) known.push_back(parameter.name);
       for (const auto& [key, value] : settings) {
-        std::vector<std::string> known;
-        for (const felt::ScriptParameter& parameter : program.parameters()) known.push_back(parameter.name);
         if (std::find(known.begin(), known.end(), key) != known.end()) continue;
         const std::string near = felt::nearestName(key, known);
         throw Error(name + ": has no parameter '" + key + "'" +
