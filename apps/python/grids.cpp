@@ -325,7 +325,10 @@ const Bricks& PythonGrid::bricks() {
 }
 
 VoxelBox PythonGrid::box() {
-  if (box_) return *box_;
+  {
+    const std::lock_guard lock(mutex_);
+    if (box_) return *box_;
+  }
   const VdbGridInfo info = describe(vdb());
   const std::lock_guard lock(mutex_);
   box_ = VoxelBox{info.indexMin,
