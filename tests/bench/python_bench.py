@@ -2,7 +2,7 @@
 """Measures what the module for Python costs beside C++: fields at 10^7 points, a grid of 512^3 as arrays, import, render.
 
 Usage: python_bench.py BUILD_FOLDER, with BUILD_FOLDER/python on Python's path. Figures are those of the fastest of several
-runs, in turn with what they are compared with.
+runs, in turn with what they are compared with; of fields, medians of 25 such pairs.
 """
 import os
 import statistics
@@ -29,17 +29,17 @@ def fields(build):
     points = np.random.default_rng(1).uniform(-2, 2, (10_000_000, 3)).astype(np.float32)
     ball = nephele.sphere((0, 0, 0), 1)
     made = {"sphere": ball, "cloud": ball + 0.1 * abs(nephele.fractalsum(4, 3.0))}
-    mine, its = {}, {}
-    for _ in range(3):
-        for line in subprocess.run([os.path.join(build, "bin/python_peer")], capture_output=True, text=True,
-                                   check=True).stdout.splitlines():
-            name, seconds = line.split()
-            its[name] = min(its.get(name, 1e9), float(seconds))
+    pairs = {name: [] for name in made}
+    for _ in range(25):
+        lines = subprocess.run([os.path.join(build, "bin/python_peer")], capture_output=True, text=True, check=True).stdout
+        its = dict(line.split() for line in lines.splitlines())
         for name, field in made.items():
-            mine[name] = min(mine.get(name, 1e9), fastest(lambda field=field: field(points), 5))
-    for name in made:
-        print(f"field, {name}, 10^7 points: {100 * mine[name]:.2f} ns per point, C++ {100 * its[name]:.2f}, "
-              f"{mine[name] / its[name]:.2f} times")
+            pairs[name].append((fastest(lambda field=field: field(points)), float(its[name])))
+    for name, times in pairs.items():
+        mine, peer = (100 * statistics.median(column) for column in zip(*times))
+        ratios = sorted(a / b for a, b in times)
+        print(f"field, {name}, 10^7 points: {mine:.2f} ns per point, C++ {peer:.2f}, {statistics.median(ratios):.3f} times "
+              f"({ratios[0]:.3f} to {ratios[-1]:.3f}), medians of {len(times)} pairs")
 
 
 def grids():
