@@ -20,6 +20,7 @@
 #include "apps/sequence.h"
 #include "apps/wedge.h"
 #include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/felt/diagnostic.h"
 
@@ -207,7 +208,15 @@ Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<st
   Line line = lineOf(command, arguments, withSettings);
   const std::vector<std::string> settings = withSettings(arguments);
   line.configOptions = typedLine(std::span(settings).subspan(arguments.size()));
-  command.parse(line.first());
+  try {
+    command.parse(line.first());
+  } catch (const CLI::Success&) {
+    throw;
+  } catch (const std::exception&) {
+    Command fresh(command.verb);
+    if (!command.verb.passesOthersOn) checkConfigFile({fresh.app, name, names}, arguments, fresh.app);
+    throw;
+  }
   return line;
 }
 
@@ -254,7 +263,7 @@ int runVerb(const Verb& verb, const std::vector<Verb>& verbs, std::vector<std::s
 }
 
 int unknownVerb(const std::string& word, const std::vector<Verb>& verbs) {
-  const std::string meant = closestWord(word, namesOf(verbs));
+  const std::string meant = nearestName(word, namesOf(verbs));
   return usageError("nephele", fmt::format("unknown verb '{}'{}", word,
                                            meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/options/options.h"
+#include "nephele/modeling/base/nearest_name.h"
 
 namespace nephele::apps {
 
@@ -28,7 +29,7 @@ std::vector<std::string> lookNames() {
 std::string lookText(const std::string& name) {
   for (const auto& [known, text] : kLooks)
     if (known == name) return std::string(text);
-  const std::string meant = closestWord(name, lookNames());
+  const std::string meant = nearestName(name, lookNames());
   throw CLI::ValidationError("--look",
                              fmt::format("there is no look '{}'{}; there are: {}", name,
                                          meant.empty() ? "" : fmt::format(", did you mean '{}'?", meant),

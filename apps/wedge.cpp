@@ -10,6 +10,7 @@
 
 #include "apps/options/options.h"
 #include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/render/image/frame_range.h"
 
 namespace nephele::apps {
@@ -116,7 +117,7 @@ std::optional<Wedge> Wedge::taken(std::vector<std::string>& arguments, const CLI
       std::vector<std::string> names;
       for (const CLI::Option* one : app.get_options())
         for (const std::string& name : one->get_lnames()) names.push_back(name);
-      const std::string meant = option ? "" : closestWord(axis.option, names);
+      const std::string meant = option ? "" : nearestName(axis.option, names);
       throw CLI::ValidationError(
           "--wedge", fmt::format("'{}' is not an option that a wedge can vary{}", axis.option,
                                  meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "nephele/modeling/base/nearest_name.h"
+
 // All of CLI11 here alone: the others take CLI/App.hpp, or each would compile its formatter and its reader of
 // configuration files again.
 #include <CLI/CLI.hpp>
@@ -117,7 +119,7 @@ void Command::parse(std::vector<std::string> arguments) {
   for (const std::string& extra : app.remaining()) {
     if (!extra.starts_with('-'))
       throw CLI::ParseError(fmt::format("'{}' is one argument too many", extra), CLI::ExitCodes::ExtrasError);
-    const std::string meant = closestWord(extra.substr(0, extra.find('=')), optionNames(app));
+    const std::string meant = nearestName(extra.substr(0, extra.find('=')), optionNames(app));
     throw CLI::ParseError(fmt::format("unknown option '{}'{}", extra,
                                       meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)),
                           CLI::ExitCodes::ExtrasError);

@@ -8,6 +8,7 @@
 
 #include "apps/felt/explain.h"
 #include "nephele/levelset/io/output_file.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/base/text_file.h"
 
 namespace nephele::apps {
@@ -57,7 +58,7 @@ std::map<std::string, std::string> settingsOf(const std::vector<std::string>& te
     if (equals == std::string::npos || equals == 0) refuseValue("--set", text, "NAME=VALUE");
     const std::string name = text.substr(0, equals);
     if (std::ranges::count(names, name) == 0) {
-      const std::string near = felt::nearestName(name, names);
+      const std::string near = nearestName(name, names);
       throw CLI::ValidationError(
           "--set", fmt::format("{} has no parameter '{}'{}", program.sources()[0].name(), name,
                                !near.empty()   ? fmt::format("; did you mean '{}'?", near)

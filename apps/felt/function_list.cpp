@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "apps/felt/felt_scripts.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/base/printable.h"
 
 namespace nephele::apps {
@@ -94,7 +95,7 @@ void listFunctions(const std::string& word, Run& run) {
     }
   }
   if (isAny) return;
-  const std::string near = felt::nearestName(word, feltFunctions().names());
+  const std::string near = nearestName(word, feltFunctions().names());
   throw Error(fmt::format("no function is called or speaks of {}{}", quoted(word, 60),
                           near.empty() ? "" : fmt::format("; did you mean '{}'?", near)));
 }

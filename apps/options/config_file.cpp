@@ -8,15 +8,10 @@
 #include "apps/options/old_names.h"
 #include "apps/options/options.h"
 #include "apps/options/toml_file.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::apps {
 namespace {
-
-[[noreturn]] void refuse(const std::string& path, const toml::source_position& where,
-                         const std::string& what) {
-  const std::string place = where.line > 0 ? fmt::format("{}:{}", path, where.line) : path;
-  throw CLI::ParseError(fmt::format("--config: {}: {}", place, what), CLI::ExitCodes::InvalidError);
-}
 
 bool isGiven(const CLI::Option& option, const std::vector<std::string>& arguments) {
   return std::any_of(arguments.begin(), arguments.end(), [&](const std::string& argument) {
@@ -26,14 +21,6 @@ bool isGiven(const CLI::Option& option, const std::vector<std::string>& argument
       if (argument.starts_with("-" + name) && !argument.starts_with("--")) return true;
     return false;
   });
-}
-
-std::string textOf(const std::string& path, const std::string& key, const toml::node& value) {
-  if (auto text = value.value_exact<std::string>()) return *text;
-  if (auto whole = value.value_exact<std::int64_t>()) return std::to_string(*whole);
-  if (auto number = value.value_exact<double>()) return fmt::format("{}", *number);
-  refuse(path, value.source().begin,
-         fmt::format("'{}' must be a text, a number, true, false or an array", key));
 }
 
 // Whether any of `arguments` is neither an option nor what one takes.
@@ -46,94 +33,135 @@ bool hasInput(const CLI::App& verb, const std::vector<std::string>& arguments) {
   return false;
 }
 
-// Options that a table sets and `arguments` do not.
-struct Settings {
-  const ConfiguredVerb& verb;
-  const std::string& path;
-  const std::vector<std::string> typed;
-  std::vector<std::string> arguments;
-
-  // The name of today for a key.
-  std::string nameOf(const toml::key& key) const {
-    return currentName(verb.name, "--" + std::string(key.str())).substr(2);
-  }
-
-  void add(const std::string& key, const CLI::Option& option, const toml::node& value) {
-    if (isGiven(option, typed)) return;
-    if (auto flag = value.value_exact<bool>()) {
-      if (option.get_expected_min() != 0)
-        refuse(path, value.source().begin, fmt::format("'{}' takes a value, not true or false", key));
-      if (*flag) arguments.push_back("--" + key);
-    } else if (const toml::array* list = value.as_array()) {
-      for (const toml::node& item : *list)
-        arguments.push_back(fmt::format("--{}={}", key, textOf(path, key, item)));
-    } else {
-      arguments.push_back(fmt::format("--{}={}", key, textOf(path, key, value)));
-    }
-  }
-
-  const CLI::Option& optionOf(const std::string& key, const toml::node& value) const {
-    const CLI::Option* option = verb.app.get_option_no_throw("--" + key);
-    if (option && key != "config" && key != "look" && !key.starts_with("help")) return *option;
-    std::vector<std::string> names;
-    for (const CLI::Option* one : verb.app.get_options())
-      for (const std::string& name : one->get_lnames()) names.push_back(name);
-    const std::string meant = closestWord(key, names);
-    refuse(path, value.source().begin,
-           fmt::format("'{}' is not an option of this verb{}", key,
-                       meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
-  }
+// An option as a table sets it: once for every item of an array.
+struct Setting {
+  struct Value {
+    const toml::node& node;
+    std::string text;
+  };
+  std::string name;
+  const CLI::Option& option;
+  std::vector<Value> values;
 };
 
-// Of a table of its own where there is one, which other verbs pass over.
-std::vector<std::string> withTable(const ConfiguredVerb& verb, const std::string& path,
-                                   const toml::table& table, std::vector<std::string> arguments) {
-  Settings settings{verb, path, arguments, arguments};
-  for (const auto& [name, value] : table) {
-    const std::string key = value.is_table() ? std::string(name.str()) : settings.nameOf(name);
+Setting::Value valueOf(const TomlFile& file, const std::string& key, const toml::node& node) {
+  if (auto text = node.value_exact<std::string>()) return {node, *text};
+  if (auto whole = node.value_exact<std::int64_t>()) return {node, std::to_string(*whole)};
+  if (auto number = node.value_exact<double>()) return {node, fmt::format("{}", *number)};
+  file.refuse(felt::Code::wrongType, node.source(),
+              nephele::quoted(key) + " must be a text, a number, true, false or an array");
+}
+
+const CLI::Option& optionOf(const CLI::App& app, const TomlFile& file, const toml::key& key,
+                            const std::string& name) {
+  const CLI::Option* option = app.get_option_no_throw("--" + name);
+  if (option && name != "config" && name != "look" && !name.starts_with("help")) return *option;
+  std::vector<std::string> names;
+  for (const CLI::Option* one : app.get_options())
+    for (const std::string& other : one->get_lnames()) names.push_back(other);
+  file.refuseKey(key, name, "not an option of this verb", names, false);
+}
+
+Setting settingOf(const ConfiguredVerb& verb, const TomlFile& file, const toml::key& key,
+                  const toml::node& value) {
+  const std::string name = currentName(verb.name, "--" + std::string(key.str())).substr(2);
+  Setting setting{name, optionOf(verb.app, file, key, name), {}};
+  if (setting.option.get_items_expected_max() == 0 && !value.is_boolean())
+    file.refuse(felt::Code::wrongType, value.source(), nephele::quoted(name) + " is true or false");
+  if (const auto flag = value.value_exact<bool>()) {
+    if (setting.option.get_expected_min() != 0)
+      file.refuse(felt::Code::wrongType, value.source(),
+                  nephele::quoted(name) + " takes a value, not true or false");
+    if (*flag) setting.values.push_back({value, ""});
+  } else if (const toml::array* list = value.as_array()) {
+    for (const toml::node& item : *list) setting.values.push_back(valueOf(file, name, item));
+  } else {
+    setting.values.push_back(valueOf(file, name, value));
+  }
+  return setting;
+}
+
+void add(const Setting& setting, std::vector<std::string>& arguments) {
+  const bool isFlag = setting.option.get_expected_min() == 0;
+  for (const Setting::Value& value : setting.values)
+    arguments.push_back(isFlag && value.node.is_boolean() ? "--" + setting.name
+                                                          : fmt::format("--{}={}", setting.name, value.text));
+}
+
+// What a file sets for the verb that `arguments` do not: options, and the table of the verb's own. Tables of
+// other verbs are passed over.
+std::vector<Setting> settingsOf(const ConfiguredVerb& verb, TomlFile& file,
+                                const std::vector<std::string>& arguments) {
+  std::vector<Setting> settings;
+  const auto take = [&](const toml::key& key, const toml::node& value) {
+    file.collect([&] {
+      Setting setting = settingOf(verb, file, key, value);
+      if (!isGiven(setting.option, arguments)) settings.push_back(std::move(setting));
+    });
+  };
+  for (const auto& [key, value] : file.table()) {
     if (!value.is_table()) {
-      settings.add(key, settings.optionOf(key, value), value);
-    } else if (key == verb.name) {
-      for (const auto& [inner, own] : *value.as_table()) {
-        const std::string option = settings.nameOf(inner);
-        settings.add(option, settings.optionOf(option, own), own);
-      }
-    } else if (std::ranges::count(verb.verbs, key) == 0) {
-      refuse(path, value.source().begin, fmt::format("'{}' is neither an option nor a verb", key));
+      take(key, value);
+    } else if (key.str() == verb.name) {
+      for (const auto& [inner, own] : *value.as_table()) take(inner, own);
+    } else if (std::ranges::count(verb.verbs, key.str()) == 0) {
+      file.collect([&] {
+        file.refuseKey(key, std::string(key.str()), "neither an option nor a verb", verb.verbs, false);
+      });
     }
   }
-  return std::move(settings.arguments);
+  file.throwFaults();
+  return settings;
+}
+
+// The value of one option alone, as an app reads it that has read nothing yet.
+void check(const TomlFile& file, const Setting& setting, CLI::App& fresh) {
+  CLI::Option* option = fresh.get_option_no_throw("--" + setting.name);
+  for (const Setting::Value& value : setting.values) {
+    if (value.node.is_boolean()) continue;
+    const auto text = [&] { return file.textOf(value.node, value.text); };
+    try {
+      option->clear();
+      option->add_result(value.text);
+      option->run_callback();
+    } catch (const felt::ScriptError& error) {
+      throw text()->moved(error, 1);
+    } catch (const CLI::ParseError& error) {
+      const std::string message = error.what(), start = "--" + setting.name;
+      throw text()->fault(felt::Code::outOfRange,
+                          message.starts_with(start) ? setting.name + message.substr(start.size()) : message);
+    }
+  }
 }
 
 // What a look says of the verb, but for what does not go with what was typed: it is the look of another
 // shape, or at another resolution, then.
 std::vector<std::string> withLook(const ConfiguredVerb& verb, const std::string& name,
                                   std::vector<std::string> arguments) {
-  const std::string path = "the look " + name;
-  const toml::table table = toml::parse(lookText(name));
-  const toml::table* own = table[verb.name].as_table();
-  if (!own && verb.name == "turntable") own = table["render"].as_table();
+  const TomlFile file("the look " + name, lookText(name));
+  const toml::table* own = file.table()[verb.name].as_table();
+  if (!own && verb.name == "turntable") own = file.table()["render"].as_table();
   if (!own) throw CLI::ValidationError("--look", fmt::format("'{}' says nothing of {}", name, verb.name));
   const bool hasOwnInput = hasInput(verb.app, arguments);
-  Settings settings{verb, path, arguments, arguments};
+  const std::vector<std::string> typed = arguments;
   std::vector<const CLI::Option*> left;
   const auto fits = [&](const CLI::Option& option) {
     for (const CLI::Option* other : option.get_excludes())
-      if (other->get_positional() ? hasOwnInput : isGiven(*other, settings.typed)) return false;
+      if (other->get_positional() ? hasOwnInput : isGiven(*other, typed)) return false;
     return std::ranges::none_of(
         option.get_needs(), [&](const CLI::Option* other) { return std::ranges::count(left, other) > 0; });
   };
   // What others need comes first.
   for (const bool needs : {false, true})
     for (const auto& [key, value] : *own) {
-      const CLI::Option& option = settings.optionOf(std::string(key.str()), value);
-      if (option.get_needs().empty() == needs) continue;
-      if (fits(option))
-        settings.add(std::string(key.str()), option, value);
-      else
-        left.push_back(&option);
+      const Setting setting = settingOf(verb, file, key, value);
+      if (setting.option.get_needs().empty() == needs) continue;
+      if (!fits(setting.option))
+        left.push_back(&setting.option);
+      else if (!isGiven(setting.option, typed))
+        add(setting, arguments);
     }
-  return std::move(settings.arguments);
+  return arguments;
 }
 
 }  // namespace
@@ -149,9 +177,21 @@ std::optional<std::string> givenTo(const std::string& option, const std::vector<
 
 std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<std::string> arguments) {
   const std::optional<std::string> path = givenTo("--config", arguments), look = givenTo("--look", arguments);
-  if (path) arguments = withTable(verb, *path, readToml("--config", *path), std::move(arguments));
+  if (path) {
+    TomlFile file = TomlFile::read("--config", *path);
+    for (const Setting& setting : settingsOf(verb, file, std::vector(arguments))) add(setting, arguments);
+  }
   if (look) arguments = withLook(verb, *look, std::move(arguments));
   return arguments;
+}
+
+void checkConfigFile(const ConfiguredVerb& verb, const std::vector<std::string>& arguments, CLI::App& fresh) {
+  const std::optional<std::string> path = givenTo("--config", arguments);
+  if (!path) return;
+  TomlFile file = TomlFile::read("--config", *path);
+  for (const Setting& setting : settingsOf(verb, file, arguments))
+    file.collect([&] { check(file, setting, fresh); });
+  file.throwFaults();
 }
 
 }  // namespace nephele::apps

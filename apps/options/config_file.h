@@ -18,8 +18,14 @@ struct ConfiguredVerb {
 /// and that the arguments do not: the command line wins. Keys are option names without dashes; `true` stands
 /// for a flag, an array for an option that is repeated; old names do. A table named after a verb is for that
 /// verb alone. Then the same of the look named by --look, as far as it goes with what is there.
-/// @throws CLI::ParseError naming the file, the line and the key, or the look.
+/// @throws felt::ScriptError with all keys that the verb does not have, and values that no option takes;
+/// CLI::ParseError naming the file that cannot be read, or the look.
 std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<std::string> arguments);
+
+/// Where the options could not be read: whether that is because of values of the file of --config, which are
+/// shown in it then. `fresh` is the verb's app, which must not be used any more.
+/// @throws felt::ScriptError with all of them.
+void checkConfigFile(const ConfiguredVerb& verb, const std::vector<std::string>& arguments, CLI::App& fresh);
 
 /// The last text that `arguments` give to an option, as words of their own or behind an equals sign.
 std::optional<std::string> givenTo(const std::string& option, const std::vector<std::string>& arguments);

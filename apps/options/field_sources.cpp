@@ -60,7 +60,10 @@ ScalarField madeOf(const FieldValue& value, const ExpressionNames& names, double
         .as<ScalarField>();
   } catch (const felt::ScriptError& error) {
     // Short forms have no places of their own to point at.
-    if (!value.isTypedAsExpression) throw Error(value.option + ": " + error.diagnostics().front().message);
+    const felt::Diagnostic& first = error.diagnostics().front();
+    if (!value.isTypedAsExpression && value.place) throw value.place->fault(first.code, first.message);
+    if (!value.isTypedAsExpression) throw Error(value.option + ": " + first.message);
+    if (value.place) throw value.place->moved(error, 1);
     throw;
   }
 }
@@ -73,9 +76,11 @@ void requireAllowed(const FieldValue& value, const Interval& range) {
   if (isFinite && double(range.min) >= low && double(range.max) <= high &&
       (lowIsAllowed || double(range.min) > low))
     return;
-  throw Error(
-      fmt::format("{}: '{}' may be from {:g} to {:g}, allowed: {}; clamp(..., LOW, HIGH) keeps it within",
-                  value.option, value.text, range.min, range.max, value.quantity.allowed()));
+  const std::string what = fmt::format("may be from {:g} to {:g}, allowed: {}", range.min, range.max,
+                                       value.quantity.allowed()),
+                    hint = "clamp(..., LOW, HIGH) keeps it within";
+  if (value.place) throw value.place->fault(felt::Code::outOfRange, "this " + what, hint);
+  throw Error(fmt::format("{}: '{}' {}; {}", value.option, value.text, what, hint));
 }
 
 }  // namespace

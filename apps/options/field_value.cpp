@@ -7,6 +7,7 @@
 
 #include "apps/options/expression_names.h"
 #include "nephele/levelset/io/vdb_io.h"
+#include "nephele/modeling/base/nearest_name.h"
 
 namespace nephele::apps {
 namespace {
@@ -114,7 +115,7 @@ class Parser {
     if (word == "mask") return mask(rest);
     if (word == "attribute") return attribute(rest);
     if (word == "noise") return noise(rest);
-    const std::string meant = closestWord(word, {"height", "along", "facing", "mask", "attribute", "noise"});
+    const std::string meant = nearestName(word, {"height", "along", "facing", "mask", "attribute", "noise"});
     refuse(value_.quantity.allowed() +
            ", height:, along:, facing:, mask:, attribute: or noise:, or an expression after =" +
            (meant.empty() ? "" : "; did you mean " + meant + ":?"));

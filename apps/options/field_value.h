@@ -1,11 +1,13 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/options/options.h"
+#include "apps/options/toml_text.h"
 
 namespace nephele::apps {
 
@@ -49,6 +51,8 @@ struct FieldValue {
   bool isTypedAsExpression = false;
   /// Files that it may read.
   std::vector<std::string> files{};
+  /// Where it stands, if it is of a file.
+  std::shared_ptr<const TomlText> place{};
 };
 
 /// Reads `text`, the value given to `option`. @throws CLI::ValidationError naming the option, the text and

@@ -8,51 +8,46 @@
 #include "apps/options/toml_file.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/cloud/density_profile.h"
 #include "nephele/modeling/field/operations.h"
 
 namespace nephele::apps {
 namespace {
 
-/// One key of a table: says where it stands when its value is refused.
+/// One key of a table, which shows in the file what is wrong with it.
 class Entry {
  public:
-  Entry(const std::string& path, std::string name, const toml::node& value)
-      : key(std::move(name)), path_(path), value_(value) {}
+  Entry(TomlFile& file, const toml::key& name, const toml::node& value)
+      : key(name.str()), file_(file), name_(name), value_(value) {}
 
-  std::string place() const { return fmt::format("--recipe: {}:{}", path_, value_.source().begin.line); }
-
-  [[noreturn]] void refuse(const std::string& what) const {
-    throw CLI::ValidationError(place(), fmt::format("'{}' {}", key, what));
+  [[noreturn]] void refuse(const std::string& what, felt::Code code = felt::Code::outOfRange) const {
+    file_.refuse(code, value_.source(), nephele::quoted(key) + ' ' + what);
   }
 
   /// Says which key was probably meant.
   [[noreturn]] void refuseKey(const char* table, const std::vector<std::string>& keys) const {
-    std::string list;
-    for (const std::string& known : keys) list += (list.empty() ? "" : ", ") + known;
-    const std::string meant = closestWord(key, keys);
-    refuse(fmt::format("is not a key of {}{} Keys: {}", table,
-                       meant.empty() ? "." : fmt::format("; did you mean '{}'?", meant), list));
+    file_.refuseKey(name_, key, fmt::format("not a key of {}", table), keys);
   }
 
   std::string text() const {
     if (const auto text = value_.value_exact<std::string>()) return *text;
     if (const auto whole = value_.value_exact<std::int64_t>()) return std::to_string(*whole);
     if (const auto number = value_.value_exact<double>()) return fmt::format("{}", *number);
-    refuse("takes a text or a number");
+    refuse("takes a text or a number", felt::Code::wrongType);
   }
 
   double number(double low, double high) const {
     const auto number = value_.value<double>();
     if (!number || !(*number >= low && *number <= high))
-      refuse(fmt::format("takes a number from {:g} to {:g}", low, high));
+      refuse(fmt::format("takes a number from {:g} to {:g}", low, high), codeOf(number.has_value()));
     return *number;
   }
 
   int count(int low, int high) const {
     const auto whole = value_.value_exact<std::int64_t>();
     if (!whole || *whole < low || *whole > high)
-      refuse(fmt::format("takes a whole number from {} to {}", low, high));
+      refuse(fmt::format("takes a whole number from {} to {}", low, high), codeOf(whole.has_value()));
     return int(*whole);
   }
 
@@ -63,23 +58,25 @@ class Entry {
     for (int i = 0; fits && i < 3; ++i) {
       const auto number = (*list)[std::size_t(i)].value<double>();
       fits = number && std::isfinite(*number) && std::abs(*number) < 1e15;
-      if (fits) (i == 0 ? v.x : i == 1 ? v.y : v.z) = float(*number);
+      if (fits) v[i] = float(*number);
     }
-    if (!fits || !(length(v) > 0)) refuse("takes a direction [X, Y, Z] that is not 0");
+    if (!fits || !(length(v) > 0)) refuse("takes a direction [X, Y, Z] that is not 0", codeOf(fits));
     return v / length(v);
   }
 
   NoiseKind kind() const {
     try {
       return noiseKindOf(text());
+    } catch (const felt::ScriptError&) {
+      throw;
     } catch (const Error&) {
-      refuse(fmt::format("got '{}', allowed: one of {}", text(), noiseNames()));
+      file_.refuse(
+          felt::Code::outOfRange, value_.source(),
+          fmt::format("{}: got {}, allowed: one of {}", key, nephele::quoted(text(), 40), noiseNames()));
     }
   }
 
-  FieldValue field(const Quantity& quantity) const {
-    return parseFieldValue(fmt::format("{}: {}", place(), key), text(), quantity);
-  }
+  FieldValue field(const Quantity& quantity) const { return fieldOf(text(), quantity); }
 
   /// A field of numbers from 0 to 1; a file alone is a mask.
   FieldValue share() const {
@@ -87,38 +84,53 @@ class Entry {
     // Behind the file's name, the grid's may stand.
     const bool isFile = (isVolumeFile(typed) || isVolumeFile(typed.substr(0, typed.rfind(':')))) &&
                         !typed.starts_with("mask:") && !typed.starts_with("attribute:");
-    return parseFieldValue(fmt::format("{}: {}", place(), key), isFile ? "mask:" + typed + ":0,1" : typed,
-                           {.low = 0, .high = 1});
+    return fieldOf(isFile ? "mask:" + typed + ":0,1" : typed, {.low = 0, .high = 1});
   }
 
   const std::string key;
   const toml::node& value() const { return value_; }
-  const std::string& path() const { return path_; }
+  TomlFile& file() const { return file_; }
 
  private:
-  const std::string& path_;
+  static felt::Code codeOf(bool isOfType) {
+    return isOfType ? felt::Code::outOfRange : felt::Code::wrongType;
+  }
+
+  FieldValue fieldOf(const std::string& form, const Quantity& quantity) const {
+    const std::shared_ptr<const TomlText> place = file_.textOf(value_, text());
+    try {
+      FieldValue value = parseFieldValue(key, form, quantity);
+      value.option = fmt::format("--recipe: {}: {}", file_.placeOf(value_), key);
+      value.place = place;
+      return value;
+    } catch (const felt::ScriptError& error) {
+      throw place->moved(error, 1);
+    } catch (const CLI::ValidationError& error) {
+      throw place->fault(felt::Code::outOfRange, error.what());
+    }
+  }
+
+  TomlFile& file_;
+  const toml::key& name_;
   const toml::node& value_;
 };
 
 SpectrumOptions spectrumOf(const Entry& table) {
   const toml::table* keys = table.value().as_table();
-  if (!keys) table.refuse("takes a table: { exponent = 3.67, lowest = 0.5, highest = 4 }");
+  if (!keys)
+    table.refuse("takes a table: { exponent = 3.67, lowest = 0.5, highest = 4 }", felt::Code::wrongType);
   SpectrumOptions spectrum;
-  for (const auto& [name, value] : *keys) {
-    const Entry entry(table.path(), std::string(name.str()), value);
-    if (entry.key == "exponent")
-      spectrum.exponent = float(entry.number(-16, 16));
-    else if (entry.key == "lowest")
-      spectrum.lowest = float(entry.number(0, 1e6));
-    else if (entry.key == "highest")
-      spectrum.highest = float(entry.number(0, 1e6));
-    else if (entry.key == "tile")
-      spectrum.tile = float(entry.number(1e-6, 1e6));
-    else if (entry.key == "resolution")
-      spectrum.resolution = entry.count(16, 512);
-    else
-      entry.refuseKey("a spectrum", {"exponent", "lowest", "highest", "tile", "resolution"});
-  }
+  const auto set = [&](const Entry& entry) {
+    const std::string& key = entry.key;
+    if (key == "exponent") return void(spectrum.exponent = float(entry.number(-16, 16)));
+    if (key == "lowest") return void(spectrum.lowest = float(entry.number(0, 1e6)));
+    if (key == "highest") return void(spectrum.highest = float(entry.number(0, 1e6)));
+    if (key == "tile") return void(spectrum.tile = float(entry.number(1e-6, 1e6)));
+    if (key == "resolution") return void(spectrum.resolution = entry.count(16, 512));
+    entry.refuseKey("a spectrum", {"exponent", "lowest", "highest", "tile", "resolution"});
+  };
+  for (const auto& [name, value] : *keys)
+    table.file().collect([&] { set(Entry(table.file(), name, value)); });
   return spectrum;
 }
 
@@ -144,18 +156,21 @@ void set(LayerRecipe& layer, const Entry& entry) {
                    "seed", "amplitude", "frequency", "billow", "billow_scale", "mask", "direction", "bias"});
 }
 
-LayerRecipe recipeOf(const std::string& path, const toml::table& table) {
+LayerRecipe recipeOf(TomlFile& file, const toml::table& table) {
   LayerRecipe layer;
-  layer.place = fmt::format("--recipe: {}:{}", path, table.source().begin.line);
-  for (const auto& [name, value] : table) set(layer, Entry(path, std::string(name.str()), value));
-  const auto needs = [&](const char* key, const char* other, bool isThere) {
-    if (const toml::node* value = table.get(key); value && !isThere)
-      Entry(path, key, *value).refuse(fmt::format("needs '{}' beside it", other));
+  layer.place = "--recipe: " + file.placeOf(table);
+  for (const auto& [name, value] : table) file.collect([&] { set(layer, Entry(file, name, value)); });
+  const auto needs = [&](const char* key, const char* other) {
+    if (const auto found = table.find(key); found != table.end() && !table.contains(other))
+      file.collect([&] {
+        file.refuse(felt::Code::expected, found->first.source(),
+                    fmt::format("'{}' needs '{}' beside it", key, other));
+      });
   };
-  needs("bias", "direction", layer.direction.has_value());
-  needs("period", "time", layer.time.has_value());
-  needs("octave_lacunarity", "octaves", layer.octaves > 1);
-  needs("octave_roughness", "octaves", layer.octaves > 1);
+  needs("bias", "direction");
+  needs("period", "time");
+  needs("octave_lacunarity", "octaves");
+  needs("octave_roughness", "octaves");
   return layer;
 }
 
@@ -204,25 +219,29 @@ void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, F
 }  // namespace
 
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
-  const toml::table file = readToml("--recipe", path);
+  TomlFile file = TomlFile::read("--recipe", path);
   std::vector<LayerRecipe> layers;
-  for (const auto& [name, value] : file) {
-    const Entry entry(path, std::string(name.str()), value);
-    if (entry.key != "layer") entry.refuseKey("a recipe", {"layer"});
-    const toml::array* tables = value.as_array();
-    if (!tables || !tables->is_homogeneous<toml::table>())
-      entry.refuse("is a list of tables, each below a line [[layer]]");
-    for (const toml::node& table : *tables) layers.push_back(recipeOf(path, *table.as_table()));
-  }
+  for (const auto& [name, value] : file.table())
+    file.collect([&] {
+      const Entry entry(file, name, value);
+      if (entry.key != "layer") entry.refuseKey("a recipe", {"layer"});
+      const toml::array* tables = value.as_array();
+      if (!tables || !tables->is_homogeneous<toml::table>())
+        entry.refuse("is a list of tables, each below a line [[layer]]", felt::Code::wrongType);
+      for (const toml::node& table : *tables) {
+        if (layers.size() == std::size_t(kMaxCumuloLayers))
+          file.refuse(felt::Code::limit, table.source(),
+                      fmt::format("there are {} layers, allowed: 1 to {}", tables->size(), kMaxCumuloLayers));
+        layers.push_back(recipeOf(file, *table.as_table()));
+      }
+    });
+  file.throwFaults();
   if (layers.empty()) throw CLI::ValidationError("--recipe", path + ": has no [[layer]]");
-  if (layers.size() > std::size_t(kMaxCumuloLayers))
-    throw CLI::ValidationError("--recipe", fmt::format("{}: has {} layers, allowed: 1 to {}", path,
-                                                       layers.size(), kMaxCumuloLayers));
   return layers;
 }
 
 bool isLayerRecipe(const std::string& path) {
-  return readToml("--recipe", path).contains("layer");
+  return TomlFile::read("--recipe", path).table().contains("layer");
 }
 
 std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,
@@ -238,6 +257,8 @@ std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, c
     try {
       apply(recipes[i], int(i), fractal, sources, layers[i]);
     } catch (const Cancelled&) {
+      throw;
+    } catch (const felt::ScriptError&) {
       throw;
     } catch (const Error& error) {
       const std::string what = error.what();

@@ -11,7 +11,7 @@ namespace nephele::apps {
 
 /// One [[layer]] of a recipe; what is not given follows the fractal form. docs/recipes.md describes the keys.
 struct LayerRecipe {
-  /// "cloud.toml:7", for messages.
+  /// "--recipe: cloud.toml:7", for messages.
   std::string place;
   std::optional<NoiseKind> noise;
   std::optional<SpectrumOptions> spectrum;
@@ -32,15 +32,16 @@ struct LayerRecipe {
   }
 };
 
-/// Reads the recipe of all layers. @throws CLI::ValidationError naming the file, the line, the key and what
-/// is allowed.
+/// Reads the recipe of all layers. @throws felt::ScriptError with all that is wrong with it, shown in the
+/// file; CLI::ValidationError where it cannot be read or has no layers.
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path);
 
-/// Whether a TOML file has layers, and not options. @throws CLI::ValidationError as readLayerRecipe.
+/// Whether a TOML file has layers, and not options. @throws felt::ScriptError where it is no TOML;
+/// CLI::ValidationError where it cannot be read.
 bool isLayerRecipe(const std::string& path);
 
 /// The layers of `fractal`, of which the first are changed as the recipes say. What is not changed is the
-/// same bit for bit. @throws Error naming the place in the recipe.
+/// same bit for bit. @throws Error naming the place in the recipe, or showing it.
 std::vector<CumuloLayer> recipeLayers(const std::vector<LayerRecipe>& recipes, const CumuloFractal& fractal,
                                       FieldSources& sources);
 

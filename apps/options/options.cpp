@@ -278,29 +278,6 @@ std::vector<double> parseNumbers(const std::string& option, const std::string& t
   }
 }
 
-std::string closestWord(const std::string& word, const std::vector<std::string>& candidates) {
-  std::string best;
-  std::size_t bestDistance = word.size() / 3 + 2;
-  for (const std::string& candidate : candidates) {
-    std::vector<std::size_t> row(candidate.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t(0));
-    for (std::size_t i = 0; i < word.size(); ++i) {
-      std::size_t diagonal = row[0];
-      row[0] = i + 1;
-      for (std::size_t j = 0; j < candidate.size(); ++j) {
-        const std::size_t substituted = diagonal + (word[i] == candidate[j] ? 0 : 1);
-        diagonal = row[j + 1];
-        row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
-      }
-    }
-    if (row.back() < bestDistance) {
-      bestDistance = row.back();
-      best = candidate;
-    }
-  }
-  return best;
-}
-
 CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& height,
                      const std::string& description) {
   return app

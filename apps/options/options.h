@@ -123,7 +123,4 @@ std::optional<double> parseBytes(std::string_view text);
 /// The numbers of a comma-separated list, or a usage error that names `option`, `text` and the `form` wanted.
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, const std::string& form);
 
-/// The one of `candidates` that `word` was probably meant to be, or "".
-std::string closestWord(const std::string& word, const std::vector<std::string>& candidates);
-
 }  // namespace nephele::apps

@@ -8,6 +8,8 @@
 #include <string_view>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/nearest_name.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/text_file.h"
 
 namespace nephele::apps {
@@ -32,47 +34,95 @@ std::size_t endOfText(const std::string& toml, std::size_t begin) {
   return toml.size();
 }
 
-/// The line of a key that nests too deep, or 0.
-int lineOfDeepKey(const std::string& toml) {
-  int line = 1, dots = 0;
+/// Where a key begins to nest too deep, or the end of the text.
+std::size_t deepKeyIn(const std::string& toml) {
+  int dots = 0;
   for (std::size_t i = 0; i < toml.size();) {
     const char c = toml[i];
     if (c == '"' || c == '\'') {
-      const std::size_t end = endOfText(toml, i);
-      line += int(std::count(toml.begin() + std::ptrdiff_t(i), toml.begin() + std::ptrdiff_t(end), '\n'));
-      i = end;
+      i = endOfText(toml, i);
       continue;
     }
     if (c == '#') {
       i = std::min(toml.find('\n', i), toml.size());
       continue;
     }
-    line += c == '\n';
     dots = c == '.' ? dots + 1 : std::string_view("\n,={[").find(c) != std::string_view::npos ? 0 : dots;
-    if (dots >= kDeepest) return line;
+    if (dots >= kDeepest) return i;
     ++i;
   }
-  return 0;
+  return toml.size();
+}
+
+/// As toml++ says it, without what it was doing.
+std::string sentenceOf(const toml::parse_error& error) {
+  constexpr std::string_view start = "Error while parsing ";
+  const std::string_view text = error.description();
+  return std::string(text.starts_with(start) ? text.substr(start.size()) : text);
 }
 
 }  // namespace
 
-toml::table readToml(const std::string& option, const std::string& path) {
-  std::string toml;
+TomlFile TomlFile::read(const std::string& option, const std::string& path) {
   try {
-    toml = readTextFile(path, kLargest);
+    return {path, readTextFile(path, kLargest)};
+  } catch (const felt::ScriptError&) {
+    throw;
   } catch (const Error& error) {
     throw CLI::ValidationError(option, error.what());
   }
-  if (const int line = lineOfDeepKey(toml))
-    throw CLI::ValidationError(option,
-                               fmt::format("{}:{}: a key nests more than {} deep", path, line, kDeepest));
-  try {
-    return toml::parse(toml, path);
-  } catch (const toml::parse_error& error) {
-    throw CLI::ValidationError(
-        option, fmt::format("{}:{}: {}", path, error.source().begin.line, error.description()));
+}
+
+TomlFile::TomlFile(std::string name, std::string text) {
+  // toml++ passes over the mark of UTF-8, and does not count it.
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  felt::Sources sources;
+  sources.add(std::move(name), std::move(text));
+  const felt::Source& source = sources[0];
+  source_ = std::make_shared<const felt::Sources>(sources);
+  if (const std::size_t deep = deepKeyIn(source.text()); deep < source.text().size()) {
+    const felt::Span span{0, int(deep), int(deep) + 1};
+    throw felt::ScriptError(
+        {{felt::Code::tooDeep, span, fmt::format("a key nests more than {} deep", kDeepest)}}, *source_);
   }
+  try {
+    table_ = toml::parse(source.text());
+  } catch (const toml::parse_error& error) {
+    refuse(felt::Code::expected, error.source(), sentenceOf(error));
+  }
+}
+
+std::string TomlFile::placeOf(const toml::node& node) const {
+  return fmt::format("{}:{}", (*source_)[0].name(), node.source().begin.line);
+}
+
+int TomlFile::offsetOf(const toml::source_position& position) const {
+  return (*source_)[0].offsetOf({int(position.line), int(position.column)});
+}
+
+felt::Span TomlFile::spanOf(const toml::source_region& region) const {
+  return {0, offsetOf(region.begin), offsetOf(region.end)};
+}
+
+std::shared_ptr<const TomlText> TomlFile::textOf(const toml::node& node, const std::string& value) const {
+  return std::make_shared<const TomlText>(source_, spanOf(node.source()), value);
+}
+
+void TomlFile::refuse(felt::Code code, const toml::source_region& where, std::string message,
+                      std::string hint) const {
+  throw felt::ScriptError({{code, spanOf(where), std::move(message), std::move(hint)}}, *source_);
+}
+
+void TomlFile::refuseKey(const toml::key& key, const std::string& name, const std::string& isNot,
+                         const std::vector<std::string>& known, bool listsThem) const {
+  const std::string meant = nearestName(name, known);
+  std::string hint = meant.empty() ? "" : fmt::format("did you mean `{}`?", meant);
+  if (meant.empty() && listsThem) hint = fmt::format("keys: {}", fmt::join(known, ", "));
+  refuse(felt::Code::unknownName, key.source(), nephele::quoted(name, 40) + " is " + isNot, std::move(hint));
+}
+
+void TomlFile::throwFaults() const {
+  if (!faults_.empty()) throw felt::ScriptError(faults_, *source_);
 }
 
 }  // namespace nephele::apps

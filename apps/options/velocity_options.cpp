@@ -9,6 +9,7 @@
 #include "apps/options/expression_names.h"
 #include "nephele/levelset/flow/advection_files.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/field/operations.h"
 
 namespace nephele::apps {
@@ -96,7 +97,7 @@ void set(VelocityArguments& velocity, const Entry& entry) {
   if (entry.key == "time") return void(velocity.time = float(entry.number(-1e6, 1e6)));
   std::string list;
   for (const std::string& key : keys) list += (list.empty() ? "" : ", ") + key;
-  const std::string meant = closestWord(entry.key, keys);
+  const std::string meant = nearestName(entry.key, keys);
   entry.refuse("the keys " + list + (meant.empty() ? "" : "; did you mean " + meant + "?"));
 }
 

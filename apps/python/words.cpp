@@ -8,6 +8,7 @@
 #include "apps/python/values.h"
 #include "apps/python/watch.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/felt/program.h"
 
 namespace nephele::python {
@@ -271,7 +272,7 @@ py::dict runScript(const std::string& text, const std::map<std::string, std::str
       for (const felt::ScriptParameter& parameter : program.parameters()) known.push_back(parameter.name);
       for (const auto& [key, value] : settings) {
         if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-        const std::string near = felt::nearestName(key, known);
+        const std::string near = nearestName(key, known);
         throw Error(name + ": has no parameter '" + key + "'" +
                     (near.empty() ? "" : "; did you mean '" + near + "'?"));
       }

@@ -90,7 +90,7 @@ class CallError : public Error {
   std::string hint_;
 };
 
-/// A script that cannot be used: all of its faults. `what()` is their text without a line end at the end.
+/// A script, or another text of which places can be shown, that cannot be used: all of its faults. `what()` is their text without a line end at the end.
 class ScriptError : public Error {
  public:
   ScriptError(std::vector<Diagnostic> diagnostics, const Sources& sources);
@@ -105,8 +105,5 @@ class ScriptError : public Error {
   std::vector<Diagnostic> diagnostics_;
   std::string json_;
 };
-
-/// The one of `names` that is nearest to `name` by its spelling, or empty if none is near.
-std::string nearestName(std::string_view name, const std::vector<std::string>& names);
 
 }  // namespace nephele::felt

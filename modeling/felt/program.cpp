@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <set>
 
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/text_file.h"
 #include "nephele/modeling/felt/detail/checker.h"

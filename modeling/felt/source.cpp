@@ -30,6 +30,16 @@ Place Source::placeOf(int offset) const {
   return place;
 }
 
+int Source::offsetOf(const Place& place) const {
+  if (place.line > static_cast<int>(lineStarts_.size())) return static_cast<int>(text_.size());
+  int offset = lineStarts_[place.line - 1];
+  const auto isInside = [&] { return offset < static_cast<int>(text_.size()); };
+  for (int column = 1; column < place.column && isInside(); ++column) do
+      ++offset;
+    while (isInside() && (static_cast<unsigned char>(text_[offset]) & 0xC0) == 0x80);
+  return offset;
+}
+
 std::string_view Source::lineAt(int offset) const {
   const int begin = lineStart(offset);
   std::size_t end = text_.find('\n', begin);

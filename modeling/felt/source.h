@@ -31,6 +31,8 @@ class Source {
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
   Place placeOf(int offset) const;
+  /// The offset of a place; the end of the text where there is no such place.
+  int offsetOf(const Place& place) const;
   /// The line that holds the character at `offset`, without its end.
   std::string_view lineAt(int offset) const;
   /// The offset at which that line begins.

@@ -195,15 +195,6 @@ TEST(Program, FilesSayWhatWasTypedAndWhatAConfigFileGave) {
   EXPECT_FALSE(describe(readVdbFile(out)[0]).metadata.contains("config_options"));
 }
 
-TEST(Program, ConfigFileWithAnUnknownKeyNamesItsLine) {
-  const TemporaryFolder folder;
-  std::ofstream(folder.file("options.toml")) << "resolution = 24\nresolutoin = 24\n";
-  const ProgramResult result = runProgram("levelset " + kMesh + " -o " + folder.file("out.vdb") +
-                                          " --config " + folder.file("options.toml"));
-  EXPECT_EQ(result.exitCode, 2);
-  EXPECT_NE(result.errors.find("options.toml:2"), std::string::npos) << result.errors;
-}
-
 // /dev/full takes every write and says that the disk is full.
 TEST(Program, WhatCannotBePrintedFailsNoJobButAnAnswerThatCannotBePrintedDoes) {
   const TemporaryFolder folder;
@@ -224,7 +215,7 @@ TEST(Program, ConfigFilesThatAreNoneAreRefused) {
   const std::string convert = "levelset " + kMesh + " -o " + folder.file("out.vdb") + " --config ";
   const ProgramResult nested = runProgram(convert + folder.file("dotted.toml"));
   EXPECT_EQ(nested.exitCode, 2);
-  EXPECT_NE(nested.errors.find("dotted.toml:3: a key nests more than 32 deep"), std::string::npos)
+  EXPECT_NE(nested.errors.find("dotted.toml:3:64: error: a key nests more than 32 deep"), std::string::npos)
       << nested.errors;
   const ProgramResult notAFile = runProgram(convert + folder.file("."));
   EXPECT_EQ(notAFile.exitCode, 2);

@@ -67,16 +67,20 @@ const std::vector<apps::Verb>& verbs() {
 }
 
 /// Parses arguments as a verb does; its body does not run.
-void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
-  CLI::App app(verb.summary, verb.name);
-  const apps::BoundVerb bound = verb.bind(app);
-  app.allow_extras();
+const std::vector<std::string>& verbNames() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
     for (const apps::Verb& each : verbs()) all.push_back(each.name);
     return all;
   }();
-  arguments = apps::withConfigFile({app, verb.name, names}, std::move(arguments));
+  return names;
+}
+
+void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
+  CLI::App app(verb.summary, verb.name);
+  const apps::BoundVerb bound = verb.bind(app);
+  app.allow_extras();
+  arguments = apps::withConfigFile({app, verb.name, verbNames()}, std::move(arguments));
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
 }
@@ -107,9 +111,23 @@ void useCamera(const Input& input) {
           "");
 }
 
+/// Faults that are shown in the text of the file are of several lines, by a printer of its own.
+template <class Use>
+void mayFailOrShow(std::string_view named, const Use& use) {
+  mayFail(named, [&] {
+    try {
+      use();
+    } catch (const felt::ScriptError& error) {
+      expect(!error.diagnostics().empty(), "a text is refused without a fault");
+      expect(std::string_view(error.what()).find(named) != std::string_view::npos,
+             fmt::format("{} is not named: {}", named, error.what()));
+    }
+  });
+}
+
 void useToml(const Input& input) {
   const SilentRun run;
-  mayFail(input.path, [&] {
+  mayFailOrShow(input.path, [&] {
     const auto recipes = apps::readLayerRecipe(input.path);
     apps::FieldSources fields = sources(run);
     for (const CumuloLayer& layer : apps::recipeLayers(recipes, CumuloFractal{}, fields)) {
@@ -118,7 +136,12 @@ void useToml(const Input& input) {
     }
   });
   const apps::Verb& verb = verbs()[input.hash % verbs().size()];
-  mayFail("", [&] { parse(verb, {"--config", input.path}); });
+  mayFailOrShow("", [&] { parse(verb, {"--config", input.path}); });
+  mayFailOrShow(input.path, [&] {
+    CLI::App fresh("", verb.name);
+    const apps::BoundVerb bound = verb.bind(fresh);
+    apps::checkConfigFile({fresh, verb.name, verbNames()}, {"--config", input.path}, fresh);
+  });
 }
 
 void useFieldTexts(const Input& input) {
@@ -126,14 +149,10 @@ void useFieldTexts(const Input& input) {
   const SilentRun run;
   using Unit = apps::Quantity::Unit;
   const Unit unit = input.hash % 3 == 0 ? Unit::number : input.hash % 3 == 1 ? Unit::length : Unit::frequency;
-  mayFail("--value", [&] {
-    try {
-      const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
-      apps::FieldSources fields = sources(run);
-      sample(fields.field(value));
-    } catch (const felt::ScriptError&) {
-      // Of several lines, by a printer of its own.
-    }
+  mayFailOrShow("--value", [&] {
+    const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
+    apps::FieldSources fields = sources(run);
+    sample(fields.field(value));
   });
   // A file is named by itself.
   mayFail(isVolumeFile(text) ? printable(text) : "--velocity", [&] {

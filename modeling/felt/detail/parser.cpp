@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "nephele/modeling/base/nearest_name.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/felt/detail/expression_parser.h"
 

@@ -158,6 +158,14 @@ TEST(FeltMessages, UnderlineCharactersNotBytes) {
             "s.felt:1:13: error: there is no 'c' here\n  print(\"\xC3\xA4\xC3\xB6\", c);\n              ^");
 }
 
+TEST(FeltMessages, PlacesAndOffsetsAreTheSame) {
+  const Source source("s", "ab\n\xC3\xA9\xC3\xA9x\n\nend");
+  for (const int offset : {0, 1, 2, 3, 5, 7, 8, 9, 10, 13})
+    EXPECT_EQ(source.offsetOf(source.placeOf(offset)), offset);
+  EXPECT_EQ(source.offsetOf({9, 1}), 13);
+  EXPECT_EQ(source.offsetOf({4, 99}), 13);
+}
+
 TEST(FeltMessages, AreJsonForEditors) {
   try {
     Program("dir/\"s\".felt", "print(c);\nprint(d);", allFunctions());
