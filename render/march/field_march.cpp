@@ -80,9 +80,34 @@ void FieldMarcher::march(const MarchScene& scene, std::span<const MarchRay> rays
       return isFinished;
     });
   }
+  if (colour_ && scene.hasStepColours) askColours(rays);
   spans_.assign(steps_.begin(), steps_.begin() + std::ptrdiff_t(rays.size()));
   marchSteps(scene, rays, spans_, results, records);
   for (std::size_t i = 0; i != rays.size(); ++i) results[i].samples = states_[i].samples;
+}
+
+// All rays together; what is no number counts as 0.
+void FieldMarcher::askColours(std::span<const MarchRay> rays) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i != rays.size(); ++i) count += steps_[i].size();
+  for (std::vector<float>& lane : lanes_) lane.resize(count);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i != rays.size(); ++i)
+    for (const MarchStep& step : steps_[i]) {
+      const Vec3f place = states_[i].line.at(step.place);
+      for (int axis = 0; axis != 3; ++axis) lanes_[std::size_t(axis)][next] = place[axis];
+      ++next;
+    }
+  colour_->eval({lanes_[0], lanes_[1], lanes_[2]}, {{lanes_[3], lanes_[4], lanes_[5]}});
+  next = 0;
+  for (std::size_t i = 0; i != rays.size(); ++i)
+    for (MarchStep& step : steps_[i]) {
+      for (int c = 0; c != 3; ++c) {
+        const float value = lanes_[std::size_t(3 + c)][next];
+        step.colour[c] = value > 0 ? std::min(value, 1.0f) : 0.0f;
+      }
+      ++next;
+    }
 }
 
 // Lays the next steps of a ray.

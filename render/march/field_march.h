@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -36,10 +37,12 @@ struct FieldSteps {
 /// contribution.
 class FieldMarcher {
  public:
-  /// Keeps a reference to `density`.
-  FieldMarcher(const FieldDensity& density, const FieldSteps& steps) : density_(density), how_(steps) {}
+  /// Keeps references to `density` and to its `colour`, which may be null.
+  FieldMarcher(const FieldDensity& density, const FieldSteps& steps, const VectorField* colour = nullptr)
+      : density_(density), colour_(colour), how_(steps) {}
 
-  /// As marchRays, with the density of the field along MarchRay::world; those of `scene` are not read.
+  /// As marchRays, with the density of the field along MarchRay::world; those of `scene` are not read. Where
+  /// MarchScene::hasStepColours, the colour is asked for once for every step that the light is read for.
   /// `samples` of the results are evaluations of the field. What becomes of a ray does not depend on the
   /// others.
   void march(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,
@@ -90,9 +93,11 @@ class FieldMarcher {
   void closeLight(std::uint32_t ray);
   void addLight(State& state, MarchStep step, std::vector<MarchStep>& steps) const;
   void growLight(State& state) const;
+  void askColours(std::span<const MarchRay> rays);
   float depthOf(const Piece& piece) const;
 
   const FieldDensity& density_;
+  const VectorField* colour_;
   FieldSteps how_;
   float extinction_ = 1.0f, cutoff_ = 0.0f, leastStep_ = 0.0f, leastLight_ = 0.0f, leastColour_ = 1.0f,
         growth_ = 1.0f, hidden_ = 0.0f;
@@ -104,6 +109,8 @@ class FieldMarcher {
   FieldDensity::Batch batch_;
   std::vector<std::vector<MarchStep>> steps_;
   std::vector<std::span<const MarchStep>> spans_;
+  // Places and colours of steps.
+  std::array<std::vector<float>, 6> lanes_;
 };
 
 }  // namespace nephele

@@ -90,6 +90,8 @@ void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::spa
 /// overlap; between them there is nothing.
 struct MarchStep {
   float begin = 0.0f, length = 0.0f, opticalDepth = 0.0f, place = 0.0f;
+  /// Multiplies the albedo where MarchScene::hasStepColours.
+  Vec3f colour{1, 1, 1};
 };
 
 /// As marchRays where the steps are known, near to far: the densities of `scene` are not read.

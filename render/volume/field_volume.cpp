@@ -173,21 +173,31 @@ RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progr
   return combine({part}, progress);
 }
 
-RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
-                            const Progress& progress) {
-  auto field = std::make_shared<const FieldDensity>(density, box, voxelSize, progress);
+RenderVolume gridlessVolume(const FieldParts& parts, float voxelSize, const Progress& progress) {
+  require(!parts.emission && !parts.temperature && !parts.velocity,
+          "gridless volume: an emission, a temperature or a velocity needs a grid");
+  require(std::isfinite(parts.share) && parts.share >= 0,
+          fmt::format("share: expected a finite number >= 0, got {}", parts.share));
+  const ScalarField density = parts.share == 1.0f ? parts.density : parts.density * parts.share;
+  auto field = std::make_shared<const FieldDensity>(density, parts.box, voxelSize, progress);
   const ScalarField positive = max(density, 0.0f);
   ScalarField mean(0.0f);
   for (int corner = 0; corner != 8; ++corner) {
     const Vec3f way{corner & 1 ? 0.25f : -0.25f, corner & 2 ? 0.25f : -0.25f, corner & 4 ? 0.25f : -0.25f};
     mean = mean + translate(positive, way * voxelSize);
   }
+  mean = mean * 0.125f;
   progress.begin("field");
-  BakeOptions baking;
-  baking.voxelSize = voxelSize;
-  baking.box = box;
-  baking.background = 0.0f;
-  return RenderVolume::ofField(bakeGrid(mean * 0.125f, baking, progress), std::move(field));
+  const BakeOptions baking{.voxelSize = voxelSize, .box = parts.box, .background = 0.0f};
+  VolumePart light;
+  light.density = bakeGrid(mean, baking, progress);
+  if (parts.colour) light.colour = threeGrids(*parts.colour * mask(mean), baking, progress);
+  return RenderVolume::ofField(combine({light}, progress), std::move(field), parts.colour);
+}
+
+RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
+                            const Progress& progress) {
+  return gridlessVolume({.density = density, .box = box}, voxelSize, progress);
 }
 
 }  // namespace nephele

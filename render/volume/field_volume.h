@@ -62,14 +62,17 @@ RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progr
 /// picture asks for, see FieldDensity and Refinement. Values below zero count as zero; outside of the box
 /// there is none.
 ///
+/// A colour is asked for wherever the light is read, at most a voxel apart along a ray.
+///
 /// Only the light is worked out on a grid, whose voxels of `voxelSize` (world units) hold the mean of 8
 /// places in each: shadows are as soft as that. Where nothing else is known, `fieldVoxelSize` for some 2
 /// pixels per voxel is a good choice. Pictures, deep ones and layers come from the field, normals and what
 /// falls on marched objects from the grid; paths see nothing but the field. Combined volumes take grids only.
-/// Cost: 8 evaluations
-/// per voxel and ranges of the voxels wherever the density varies.
-/// @throws Error as FieldDensity and bakeGrid do, or if the grid finds nothing of a field that may not be
-/// empty; Cancelled.
+/// Cost: 8 evaluations per voxel and ranges of the voxels wherever the density varies.
+/// @throws Error as FieldDensity, bakeGrid and combine do, if there is an emission, a temperature or a
+/// velocity, or if the grid finds nothing of a field that may not be empty; Cancelled.
+RenderVolume gridlessVolume(const FieldParts& parts, float voxelSize, const Progress& progress = silent());
+/// The same of a density alone.
 RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,
                             const Progress& progress = silent());
 

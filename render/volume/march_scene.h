@@ -46,6 +46,8 @@ struct MarchScene {
   /// Density times its colour, and light of its own: radiance * extinction *
   /// emissionScale * emission per world unit.
   ColourBricks colour, emission;
+  /// Whether steps that are known have colours of their own, in place of `colour`.
+  bool hasStepColours = false;
   float emissionScale = 1.0f;
   /// Multiplies the extinction, at most 1 each.
   float extinctionColour[3] = {1.0f, 1.0f, 1.0f};
@@ -64,7 +66,7 @@ struct MarchScene {
   }
   /// Where it holds, every colour is marched with opacities of its own; `colours` must be 3.
   bool isColoured() const {
-    return colour.table || emission.table || hasExtinctionColour() || hasColouredShadow;
+    return colour.table || hasStepColours || emission.table || hasExtinctionColour() || hasColouredShadow;
   }
 
   /// `shadow` multiplies the extinction between light and sample, per colour.

@@ -84,15 +84,17 @@ void RenderVolume::measure(const CodedDensity* coded) {
                   farthest, grid.voxelSize()));
 }
 
-RenderVolume RenderVolume::ofField(std::shared_ptr<const BrickGrid> density,
-                                   std::shared_ptr<const FieldDensity> field) {
+RenderVolume RenderVolume::ofField(RenderVolume grids, std::shared_ptr<const FieldDensity> field,
+                                   std::optional<VectorField> colour) {
   require(field != nullptr, "render volume: no field given");
-  RenderVolume volume(std::move(density));
-  require(!volume.isEmpty() || field->isEmpty(),
+  require(grids.hasColour() == colour.has_value(),
+          "render volume: a colour is needed both as a field and as grids");
+  require(!grids.isEmpty() || field->isEmpty(),
           fmt::format("render volume: nothing of the field is found with voxels of {}; use smaller ones",
-                      volume.density().voxelSize()));
-  volume.field_ = std::move(field);
-  return volume;
+                      grids.density().voxelSize()));
+  grids.field_ = std::move(field);
+  grids.fieldColour_ = std::move(colour);
+  return grids;
 }
 
 void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* name) const {

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/base/box.h"
+#include "nephele/modeling/field/field.h"
 #include "nephele/render/volume/coded_density.h"
 
 namespace nephele {
@@ -43,10 +45,11 @@ class RenderVolume {
   /// as above.
   RenderVolume(std::shared_ptr<const BrickGrid> density, CodedDensity coded);
 
-  /// A density that rays ask a field for; `density` stands for it wherever light is worked out beforehand.
-  /// @throws Error if the grid is empty and the field is not, since then nothing would be lit; and as above.
-  static RenderVolume ofField(std::shared_ptr<const BrickGrid> density,
-                              std::shared_ptr<const FieldDensity> field);
+  /// A density that rays ask a field for, and its colour, if it has one; `grids` stand for both wherever
+  /// light is worked out beforehand. @throws Error if they are empty and the field is not, since then nothing
+  /// would be lit, or only one of them has a colour.
+  static RenderVolume ofField(RenderVolume grids, std::shared_ptr<const FieldDensity> field,
+                              std::optional<VectorField> colour = std::nullopt);
 
   const BrickGrid& density() const { return *density_; }
   /// The density as the march reads it. Made at the first call, by one thread of those that ask. Cost: one
@@ -60,6 +63,8 @@ class RenderVolume {
   bool hasSamples() const { return !made_->isGivenUp; }
   /// Null where the grid is all there is.
   const FieldDensity* field() const { return field_.get(); }
+  /// Of the field, clamped to [0, 1] per colour where it is read; null where it has none.
+  const VectorField* fieldColour() const { return fieldColour_ ? &*fieldColour_ : nullptr; }
   const VolumeColour& colour() const { return colour_; }
   bool hasColour() const { return colour_.scattering[0] != nullptr; }
   bool hasEmission() const { return colour_.emission[0] != nullptr; }
@@ -119,6 +124,7 @@ class RenderVolume {
   VolumeColour colour_;
   std::shared_ptr<Made> made_ = std::make_shared<Made>();
   std::shared_ptr<const FieldDensity> field_;
+  std::optional<VectorField> fieldColour_;
   Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;
   std::vector<std::uint8_t> emptiness_, uniformity_;

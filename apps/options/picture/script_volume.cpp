@@ -22,7 +22,8 @@ struct ScriptScene {
   std::optional<double> extinction;
   std::optional<Vec3d> sky, sun;
 
-  bool hasOthers() const { return parts.colour || parts.emission || parts.velocity || parts.temperature; }
+  bool hasOthers() const { return parts.colour || needsGrid(); }
+  bool needsGrid() const { return parts.emission || parts.velocity || parts.temperature; }
 };
 
 /// The share of the memory allowed that the samples of a script may take; the light takes as much again.
@@ -155,9 +156,9 @@ RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options,
   const ScriptScene scene = runScript(path, options, picture, run);
   suggest(path, scene, picture);
   const bool isExact = options.detail == ScriptOptions::Detail::exact;
-  if (isExact && scene.hasOthers())
+  if (isExact && scene.needsGrid())
     throw Error(path +
-                ": --detail exact shows a density alone, without color, emission, temperature or velocity; "
+                ": --detail exact shows a density and its color, without emission, temperature or velocity; "
                 "--detail camera shows them");
   return namingFile(path, [&] {
     // What the camera frames shows only once the script has been looked at.
@@ -175,8 +176,7 @@ RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options,
     run.detail(
         fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path, voxelSize, side / voxelSize));
     run.stats["script"] = {{"voxel_size", voxelSize}, {"exact", isExact}};
-    return isExact ? gridlessVolume(parts.density, parts.box, voxelSize, run)
-                   : sampledVolume(parts, voxelSize, run);
+    return isExact ? gridlessVolume(parts, voxelSize, run) : sampledVolume(parts, voxelSize, run);
   });
 }
 

@@ -131,6 +131,8 @@ class Marcher {
   alignas(64) float begin_[kBlock] = {};
   // Densities, negative where they have to be looked up.
   alignas(64) float known_[kBlock] = {};
+  // Of steps that have them.
+  alignas(64) float colours_[kColours][kBlock] = {};
   int count_ = 0;
   float depth_ = 0.0f;
   // What is left of light from behind, per colour.

@@ -55,6 +55,8 @@ inline bool Marcher<kColours>::take(const MarchStep& step) {
   ds_[count_] = step.length;
   known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
   someKnown_ = true;
+  if constexpr (kColours == 3)
+    for (int c = 0; c != 3; ++c) colours_[c][count_] = step.colour[c];
   return ++count_ != kBlock || (flush() && !isHidden_);
 }
 
@@ -101,6 +103,9 @@ inline bool Marcher<kColours>::flush() {
     LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
     weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
           steps);
+    if constexpr (kColours == 3)
+      for (int c = 0; c != 3 && scene_.hasStepColours; ++c)
+        steps.weight[c] = hn::Mul(steps.weight[c], hn::Load(d, colours_[c] + i));
     if (lit_.empty() && hn::AllTrue(d, hn::Gt(steps.weightOfAll(), hn::Zero(d)))) {
       light(steps);
     } else {

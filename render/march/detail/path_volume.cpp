@@ -47,6 +47,7 @@ struct PathVolume::Part {
 
 PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
     : field_(volume.field()),
+      fieldColour_(volume.fieldColour()),
       density_{volume.density().values().data(), volume.density().table().data(),
                volume.density().brickCount()},
       toLattice_(volume.density().worldToIndex(), volume.density().firstBrick()),
@@ -151,6 +152,12 @@ void PathVolume::collide(const Part& part, PathRandom& random, RateOf&& rateOf, 
 }
 
 Vec3f PathVolume::albedoAt(const Vec3d& place) const {
+  if (fieldColour_) {
+    const Vec3f colour = (*fieldColour_)(Vec3f(place));
+    Vec3f result;
+    for (int c = 0; c != 3; ++c) result[c] = colour[c] > 0 ? albedo_[c] * std::min(colour[c], 1.0f) : 0.0f;
+    return result;
+  }
   if (!scene_.colour.table) return albedo_;
   const Vec3f p(toLattice_.point(place));
   const float there = density_(p);

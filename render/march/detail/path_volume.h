@@ -92,6 +92,7 @@ class PathVolume {
   void lookThroughField(std::span<ShadowWay> ways, Scratch& scratch) const;
 
   const FieldDensity* field_ = nullptr;
+  const VectorField* fieldColour_ = nullptr;
   GridSampler density_;
   MarchScene scene_;
   LatticeMap toLattice_;

@@ -28,6 +28,7 @@ MarchScene Picture::withoutLight(MarchScene scene) {
   scene.locals.clear();
   scene.scattered.clear();
   scene.colour = scene.emission = {};
+  scene.hasStepColours = false;
   return scene;
 }
 
@@ -86,7 +87,11 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
     const float finer = std::min(std::sqrt(options.refinement.threshold * 128), 1.0f);
     fieldSteps_.lightDepth = scene_.stepDepth * finer;
     fieldSteps_.lightLength = lit.voxelSize * finer;
-    fieldSteps_.uniformLength = scene_.locals.empty() ? 4 * lit.voxelSize * finer : fieldSteps_.lightLength;
+    fieldColour_ = lit.source->fieldColour();
+    // Beside a near light, and with colours, what is seen varies where the density does not.
+    const bool isEven = scene_.locals.empty() && !fieldColour_;
+    fieldSteps_.uniformLength = isEven ? 4 * lit.voxelSize * finer : fieldSteps_.lightLength;
+    if (fieldColour_) scene_.colour = {}, scene_.hasStepColours = true;
   }
   shadowScene_ = withoutLight(scene_);
   shadowScene_.pixelAngle = 0;
@@ -187,7 +192,7 @@ void Picture::marchAll(const MarchScene& scene, std::size_t count, bool isRecord
   const std::span<MarchResult> results{scratch.results.data(), count};
   const std::span<MarchRecord> records{scratch.records.data(), isRecorded ? count : 0};
   if (field_) {
-    if (!scratch.field) scratch.field.emplace(*field_, fieldSteps_);
+    if (!scratch.field) scratch.field.emplace(*field_, fieldSteps_, fieldColour_);
     scratch.field->march(scene, rays, results, records);
   } else {
     marchRays(scene, rays, results, records);

@@ -90,6 +90,7 @@ class Picture {
   ViewLight viewLight_;
   // Null where the density is a grid.
   const FieldDensity* field_ = nullptr;
+  const VectorField* fieldColour_ = nullptr;
   FieldSteps fieldSteps_;
   bool isDeep_ = false;
   const Holdout* holdout_ = nullptr;
