@@ -28,7 +28,9 @@ void addAdvectOptions(CLI::App& app, AdvectArguments& a) {
   app.add_option_function<std::string>(
          "--velocity", [&a](const std::string& text) { parseVelocity("--velocity", text, a.velocity); },
          "What moves: noise or curl (noise without divergence) with keys amplitude, frequency, octaves, "
-         "lacunarity, roughness, seed, kind, time; one vector for all; or a grid of vectors from a volume.")
+         "lacunarity, roughness, seed, kind, time; one vector for all, in world units or percent of the "
+         "longest "
+         "side per unit of time; or a grid of vectors from a volume.")
       ->required()
       ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
   app.add_option("--velocity-grid", a.velocity.grid,

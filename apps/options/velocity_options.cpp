@@ -16,9 +16,8 @@ namespace nephele::apps {
 namespace {
 
 constexpr const char* kForm =
-    "noise: or curl: and keys such as amplitude=2%,frequency=6x,octaves=3,seed=1, three numbers X,Y,Z, or a "
-    ".vdb or .nvdb "
-    "file";
+    "noise: or curl: and keys such as amplitude=2%,frequency=6x,octaves=3,seed=1, X,Y,Z, each in world units "
+    "(0.3) or percent of the longest side (5%) per unit of time, or a .vdb or .nvdb file";
 
 /// One "key=value" of the option.
 class Entry {
@@ -127,9 +126,15 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
     return;
   }
   if (!isVolumeFile(text) && std::count(text.begin(), text.end(), ',') == 2) {
-    const std::vector<double> v = parseNumbers(name, text, kForm);
     velocity.source = VelocityArguments::Source::constant;
-    velocity.constant = {float(v[0]), float(v[1]), float(v[2])};
+    std::string_view rest = text;
+    for (Length& component : velocity.constant) {
+      const std::size_t end = std::min(rest.find(','), rest.size());
+      const auto length = parseLength(rest.substr(0, end));
+      if (!length) refuseValue(name, text, kForm);
+      component = *length;
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
     return;
   }
   if (!isVolumeFile(text)) refuseValue(name, text, kForm);
@@ -139,7 +144,12 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
 
 VectorField VelocityArguments::field(double longestSide) const {
   if (source == Source::file) return readVelocity(path, grid);
-  if (source == Source::constant) return VectorField(constant);
+  if (source == Source::constant) {
+    Vec3f same;
+    for (int i = 0; i < 3; ++i) same[i] = float(constant[std::size_t(i)].worldUnits(longestSide));
+    require(isFinite(same), "--velocity: is faster than numbers of 32 bits can say");
+    return VectorField(same);
+  }
   if (source == Source::expression)
     return evaluated("--velocity", expression, {felt::Kind::vectorField},
                      namesOfPlace(double(time.value_or(0.0f)), seed), longestSide)

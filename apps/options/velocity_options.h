@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -8,7 +9,7 @@
 
 namespace nephele::apps {
 
-/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", "-20,0,0", a volume file, or an
+/// A velocity as typed: "noise:amplitude=2%,frequency=6x", "curl:...", "-20,0,5%", a volume file, or an
 /// expression after "=".
 struct VelocityArguments {
   enum class Source { noise, curl, constant, file, expression };
@@ -21,14 +22,15 @@ struct VelocityArguments {
   int octaves = 1, seed = 0;
   double lacunarity = 2, roughness = 0.5;
   std::optional<float> time;
-  /// The same everywhere, world units per unit of time.
-  Vec3f constant{};
+  /// The same everywhere, lengths per unit of time.
+  std::array<Length, 3> constant{};
   /// In Felt, of P, time and seed.
   std::string expression;
   /// Of the file: its path and the name of the grid, or "" to look for the usual ones.
   std::string path, grid;
 
-  /// The velocity around a shape of this longest side. @throws Error naming the file.
+  /// The velocity around a shape of this longest side. @throws Error naming the file, or that it is too fast
+  /// for single precision.
   VectorField field(double longestSide) const;
 };
 

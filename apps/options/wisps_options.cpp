@@ -44,20 +44,6 @@ std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const G
   return guidesInside(level, box, options);
 }
 
-void parseVelocityOrWind(const std::string& text, WispsArguments& a) {
-  const std::string form = "three numbers X,Y,Z, noise:KEYS, curl:KEYS or a .vdb or .nvdb file";
-  if (text.find_first_not_of("0123456789+-.,eE") == std::string::npos) {
-    const std::vector<double> v = parseNumbers("--velocity", text, form);
-    if (v.size() != 3) refuseValue("--velocity", text, form);
-    a.wind = Vec3f{float(v[0]), float(v[1]), float(v[2])};
-    if (!isFinite(*a.wind)) refuseValue("--velocity", text, form);
-    return;
-  }
-  VelocityArguments velocity;
-  parseVelocity("--velocity", text, velocity);
-  a.velocity = velocity;
-}
-
 }  // namespace
 
 std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
@@ -124,12 +110,10 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, c
   d.withColor = std::any_of(made.begin(), made.end(), [](const WispGuide& g) {
     return g.color != Vec3f{1, 1, 1};
   });
-  const bool moves = wind || velocity || std::any_of(made.begin(), made.end(), [](const WispGuide& g) {
-                       return g.velocity != Vec3f{};
-                     });
+  const bool moves = velocity || std::any_of(made.begin(), made.end(),
+                                             [](const WispGuide& g) { return g.velocity != Vec3f{}; });
   if (smears && !moves)
     throw CLI::ValidationError("--shutter", "nothing moves; give --velocity, or points with vx, vy, vz");
-  if (wind) result.velocity = VectorField(*wind);
   if (velocity) {
     VelocityArguments v = *velocity;
     v.grid = velocityGrid;
@@ -204,8 +188,11 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
       addLength(app, "--dot-radius", a.dotRadius,
                 "Radius of a dot; percent: of the wisps; default: 1.5 voxels, 0 with --shutter.");
   app.add_option_function<std::string>(
-         "--velocity", [&a](const std::string& text) { parseVelocityOrWind(text, a); },
-         "Motion of dots, added to that of the points: a vector, noise, curl noise, or a grid of vectors.")
+         "--velocity",
+         [&a](const std::string& text) { parseVelocity("--velocity", text, a.velocity.emplace()); },
+         "Motion of dots, added to that of the points: a vector, in world units or percent of the longest "
+         "side of "
+         "the wisps per unit of time, noise, curl noise, or a grid of vectors.")
       ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
   app.add_option("--velocity-grid", a.velocityGrid,
                  "Grid of the velocity file; default: v, vel, velocity, or the only one of vectors.")

@@ -32,7 +32,6 @@ struct WispsArguments {
 
   std::optional<VelocityArguments> velocity;
   std::string velocityGrid;
-  std::optional<Vec3f> wind;
   float shutterOpen = 0, shutterClose = 0;
   bool halfFloat = false;
   const CLI::Option* dotRadiusOption = nullptr;

@@ -1,4 +1,5 @@
 // The verb advect, through the program.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -161,6 +162,25 @@ TEST_F(AdvectVerb, RefusesFilesThatDoNotFit) {
     EXPECT_NE(result.errors.find(said), std::string::npos) << command << "\n" << result.errors;
   }
   EXPECT_EQ(folder_.entryCount(), 1u);  // the cloud itself
+}
+
+// Percent are of the longest side of what is carried, for each component by itself.
+TEST_F(AdvectVerb, TakesVectorsInPercent) {
+  const Box box = carriedGrids(readVdbFile(cloud())).box;
+  const double side = double(box.longestSide());
+  ASSERT_EQ(advect("percent.vdb", "--velocity 10%,0.25,-5% --dt 2").exitCode, 0);
+  ASSERT_EQ(
+      advect("units.vdb", fmt::format("--velocity {},0.25,{} --dt 2", 0.1 * side, -0.05 * side)).exitCode, 0);
+  EXPECT_EQ(density("percent.vdb")->values(), density("units.vdb")->values());
+  const Vec3f moved = density("percent.vdb")->worldBox().center() - density("cloud.vdb")->worldBox().center();
+  // Boxes end at bricks of 8 voxels, and voxels are a 32nd of the shape.
+  EXPECT_NEAR(moved.x, 0.2 * side, 8 * side / 32);
+  for (const char* bad : {"--velocity 1%,2%", "--velocity 1%,2%,x", "--velocity 1%,2%,3%%",
+                          "--velocity 1%,,3", "--velocity 1e39%,0,0", "--velocity 1%,2%,3%,4%"}) {
+    const ProgramResult result = advect("out.vdb", bad);
+    EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;
+    EXPECT_NE(result.errors.find("percent of the longest side"), std::string::npos) << bad << result.errors;
+  }
 }
 
 TEST_F(AdvectVerb, BadOptionsAreUsageErrorsThatNameThem) {

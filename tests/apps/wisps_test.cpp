@@ -150,6 +150,12 @@ TEST_F(WispsVerb, SmearsAlongTheVelocity) {
   EXPECT_NEAR(smeared.indexMax.x - still.indexMax.x, 50, 1);
   EXPECT_EQ(smeared.indexMax.y, still.indexMax.y);
   EXPECT_NEAR(mass(file("smeared.vdb")) / mass(file("still.vdb")), 1, 1e-4);
+  // In percent of the wisps, whose box is as wide as the dots may lie.
+  ASSERT_EQ(wisps("percent.vdb", options + "--velocity 100%,0,0 --shutter 0,0.5").exitCode, 0);
+  const VdbGridInfo percent = describe(readScalarGrid(file("percent.vdb")));
+  const int widest = still.indexMax.x - still.indexMin.x;
+  EXPECT_EQ(percent.indexMin.x, still.indexMin.x);
+  EXPECT_GE(percent.indexMax.x - still.indexMax.x, widest / 2 - 1);
   const ProgramResult curl = wisps("c.vdb", kSmall + "--velocity curl:amplitude=2% --shutter -1,1");
   EXPECT_EQ(curl.exitCode, 0) << curl.errors;
 }
