@@ -13,9 +13,15 @@
 #include <vector>
 
 #include "apps/extent.h"
+#include "apps/file_hashes.h"
 #include "apps/options/options.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/progress.h"
+#include "nephele/render/session/stage.h"
+
+namespace nephele {
+struct LitCloud;
+}
 
 namespace nephele::apps {
 
@@ -70,6 +76,11 @@ class Run : public Progress {
   virtual void result(const std::string& line) const = 0;
 
   double memoryLimitBytes = 0;
+
+  /// Of the files that are read.
+  FileHashes files;
+  /// What the picture before was of, by lightKey: pictures that follow may look at it again.
+  Stage<LitCloud> lit;
 };
 
 /// What is wrong with several things, one line each.

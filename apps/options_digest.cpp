@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "apps/app.h"
@@ -42,25 +41,8 @@ std::string digestOfVolume(const std::string& path) {
 
 }  // namespace
 
-void ContentHash::add(std::string_view bytes) {
-  for (const char byte : bytes) value_ = (value_ ^ std::uint8_t(byte)) * 0x100000001b3u;
-  // So that "ab", "c" and "a", "bc" differ.
-  value_ = (value_ ^ bytes.size()) * 0x100000001b3u;
-}
-
-void ContentHash::addFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::vector<char> block(std::size_t(1) << 20);
-  while (file.read(block.data(), std::streamsize(block.size())) || file.gcount() > 0)
-    add({block.data(), std::size_t(file.gcount())});
-}
-
-std::string ContentHash::text() const {
-  return fmt::format("{:016x}", value_);
-}
-
 std::string optionsDigest(const CLI::App& app, std::span<const std::string_view> others,
-                          const std::string& more) {
+                          const std::string& more, FileHashes& files) {
   ContentHash hash;
   hash.add(NEPHELE_VERSION);
   hash.add(app.get_name());
@@ -77,7 +59,7 @@ std::string optionsDigest(const CLI::App& app, std::span<const std::string_view>
       const std::string rest = equals == std::string::npos ? value : value.substr(equals + 1);
       const bool isFile = std::filesystem::is_regular_file(rest, ignored);
       hash.add(isFile ? value.substr(0, value.size() - rest.size()) : value);
-      if (isFile) hash.addFile(rest);
+      if (isFile) hash.add(files.of(rest));
     }
   }
   return hash.text();

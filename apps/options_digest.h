@@ -1,35 +1,19 @@
 #pragma once
 
 #include <CLI/App.hpp>
-#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "apps/file_hashes.h"
+
 namespace nephele::apps {
-
-/// A 64 bit FNV-1a hash of what something is made of.
-class ContentHash {
- public:
-  void add(std::string_view bytes);
-  /// A file by what it holds, wherever it is.
-  void addFile(const std::string& path);
-  template <class T>
-  void addNumbers(std::span<const T> numbers) {
-    add({reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()});
-  }
-  /// 16 digits.
-  std::string text() const;
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325u;
-};
 
 /// Says what a call makes: a hash of the options of `app` that were given, the contents of the files that
 /// they name, the version of the program, and `more`. Outputs, and options of how the program runs, do not
 /// count, nor do those named `others`. The same wherever input files are.
 std::string optionsDigest(const CLI::App& app, std::span<const std::string_view> others,
-                          const std::string& more);
+                          const std::string& more, FileHashes& files);
 
 /// What is said of outputs that are whole and have another digest.
 inline constexpr const char* kOtherDigest =

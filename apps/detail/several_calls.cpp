@@ -87,9 +87,9 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       run.part = call.part;
       run.part->range = range;
       run.beginPart(call.name, 0.05 + share * double(i), 0.05 + share * double(i + 1));
-      run.part->digest =
-          optionsDigest(command.app, kNotOfCalls,
-                        fmt::format("{} {}", call.part.framesSinceFirst, range ? textOf(*range) : ""));
+      run.part->digest = optionsDigest(
+          command.app, kNotOfCalls,
+          fmt::format("{} {}", call.part.framesSinceFirst, range ? textOf(*range) : ""), run.files);
       const bool skips = calls.skipExisting && isThere(command, run.part->digest, run);
       skipped += skips;
       if (!skips) command.bound.body(run);

@@ -62,7 +62,7 @@ const std::string& TurntableOptions::name() const {
   return scene.deep;
 }
 
-TurntablePlan::TurntablePlan(const TurntableOptions& options) {
+TurntablePlan::TurntablePlan(const TurntableOptions& options, Run& run) {
   const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
   first = range.first();
   last = range.last();
@@ -72,7 +72,7 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options) {
           "input", fmt::format("got '{}', a volume for each frame, but turntable turns around one; make the "
                                "frames by render --frames, and turn by a --camera FILE that moves",
                                input));
-  digest = optionsDigest(*options.app, kNotOfPictures, fmt::format("{}-{}", first, last));
+  digest = optionsDigest(*options.app, kNotOfPictures, fmt::format("{}-{}", first, last), run.files);
   const auto output = patternOf("--output", options.output),
              preview = patternOf("--preview", options.preview);
   for (const auto& [name, path] :

@@ -49,7 +49,7 @@ struct TurntablePlan {
   std::string digest;
 
   /// @throws CLI::ValidationError naming the option that is wrong.
-  explicit TurntablePlan(const TurntableOptions& options);
+  TurntablePlan(const TurntableOptions& options, Run& run);
 };
 
 /// Makes the folders of all outputs, and finds out whether files can be written there.

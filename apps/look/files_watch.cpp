@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/file_hashes.h"
 #include "apps/look/subject.h"
 
 namespace nephele::apps {

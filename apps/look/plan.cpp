@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <string_view>
 
+#include "apps/file_hashes.h"
 #include "apps/options/common_group.h"
 #include "apps/options/outputs.h"
+#include "apps/options/picture/light_key.h"
 
 namespace nephele::apps {
 namespace {
@@ -31,23 +33,8 @@ const Names kOfMedium{"shadows",          "shadow-detail",
                       "texture",          "texture-encoding",
                       "ground",           "ground-height",
                       "ground-color"};
-const Names kOfScreen{"view-transform", "ocio-config", "exposure"};
-const Names kOfCamera{"size",           "crop",
-                      "view",           "camera-position",
-                      "look-at",        "up",
-                      "camera",         "rotation-order",
-                      "frame",          "fov",
-                      "focal-length",   "film-width",
-                      "projection",     "orthographic-width",
-                      "f-stop",         "lens-radius",
-                      "focus-distance", "step",
-                      "samples",        "adaptive",
-                      "integrator",     "scatterings",
-                      "seed",           "aov",
-                      "holdout",        "background",
-                      "backdrop",       "aerial-perspective"};
 
-bool isIn(const Names& names, const std::string& name) {
+bool isIn(std::span<const std::string_view> names, const std::string& name) {
   return std::ranges::count(names, name) > 0;
 }
 
@@ -167,8 +154,8 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
   }
   keys.volume += level + keyOf(ofCloud, [](const std::string& name) { return isIn(kOfDensity, name); }) +
                  settings["parameters"].dump() + keyOf(ofRender, [](const std::string& name) {
-                   return !isIn(kOfLights, name) && !isIn(kOfMedium, name) && !isIn(kOfScreen, name) &&
-                          !isIn(kOfCamera, name);
+                   return !isIn(kOfLights, name) && !isIn(kOfMedium, name) && !isIn(screenOptions(), name) &&
+                          !isIn(cameraOptions(), name);
                  });
   keys.medium = keyOf(ofRender, [](const std::string& name) { return isIn(kOfMedium, name); });
   keys.lights = keyOf(ofRender, [](const std::string& name) { return isIn(kOfLights, name); });
@@ -176,7 +163,7 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
 }
 
 std::string LookPlan::cameraKey() const {
-  return keyOf(settings["render"], [](const std::string& name) { return isIn(kOfCamera, name); });
+  return keyOf(settings["render"], [](const std::string& name) { return isIn(cameraOptions(), name); });
 }
 
 }  // namespace nephele::apps

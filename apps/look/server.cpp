@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/file_hashes.h"
 #include "apps/look/controls.h"
 #include "apps/look/exports.h"
 #include "apps/look/page_files.inc"

@@ -27,7 +27,4 @@ struct LookSubject {
   static LookSubject of(const std::string& path);
 };
 
-/// Size and time of the last change of a file; "" where there is none.
-std::string fileStamp(const std::string& path);
-
 }  // namespace nephele::apps

@@ -154,8 +154,8 @@ LookTier::Picture LookTier::picture(const LookPlan& plan, const Frame& frame, Lo
   std::shared_ptr<const LitCloud> lit;
   if (isLit(plan)) {
     lit = stages_.lit();
-    picture = picture.resolved(*lit->volume, run, &lit->light.lights());
-    picture.backdrop = plan.scene.objects.showsBackdrop(picture, true);
+    picture = picture.resolved(*lit->volume, run, &lit->light);
+    plan.scene.addTo(picture, *lit->volume, true, run);
   } else {
     const auto density = volume(plan, finer, run);
     picture = picture.resolved(*density, run);
@@ -170,7 +170,6 @@ LookTier::Picture LookTier::picture(const LookPlan& plan, const Frame& frame, Lo
   // Read again for each: what stands in front may have changed.
   if (!plan.scene.holdout.empty())
     picture.render.holdout = readHoldout(plan.scene.holdout, camera, run.memoryLimitBytes);
-  picture.render.surfaces = lit->light.surfaces();
   const double rays = double(frame.width) * frame.height * picture.render.samples;
   const auto start = std::chrono::steady_clock::now();
   const std::string key = plan.cameraKey() + fmt::format("{}x{}x{};{}", frame.width, frame.height,

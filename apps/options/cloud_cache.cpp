@@ -16,8 +16,7 @@ constexpr std::string_view kNotOfLayers[]{
     "cache",      "advect-frequency", "cache-size",     "frames",     "only",           "shard",
     "wedge",      "combine",          "blend"};
 
-std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const CloudOptions& options,
-                  const Run& run) {
+std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const CloudOptions& options, Run& run) {
   ContentHash hash;
   for (const std::string& file : arguments.maskFiles()) hash.addFile(file);
   hash.addNumbers(std::span(shape.positions));
@@ -34,8 +33,8 @@ std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const Clou
   return optionsDigest(
       *arguments.cache.app, kNotOfLayers,
       fmt::format("{} {} {} {} {}", hash.text(), options.voxelSize, cloudEdgeReach(edge, options.voxelSize),
-                  run.longestSide(boundingBox(shape)),
-                  run.part && isMoving ? run.part->framesSinceFirst : 0));
+                  run.longestSide(boundingBox(shape)), run.part && isMoving ? run.part->framesSinceFirst : 0),
+      run.files);
 }
 
 }  // namespace

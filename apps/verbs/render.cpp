@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include "apps/options/picture/light_key.h"
 #include "apps/options/picture/live_picture.h"
 #include "apps/options/picture/picture_files.h"
 #include "apps/options/picture/render_options.h"
 #include "apps/options/picture/scene_options.h"
 #include "apps/options/picture/shapes_picture.h"
+#include "nephele/render/session/picture_stages.h"
 
 namespace nephele::apps {
 namespace {
@@ -13,6 +15,7 @@ struct RenderVerbOptions {
   SceneOptions scene;
   PictureFiles files;
   PictureOptions picture;
+  const CLI::App* app = nullptr;
 };
 
 void bindOptions(CLI::App& app, RenderVerbOptions& options) {
@@ -25,6 +28,22 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
   addShadowOutput(app, options.picture.light);
   addSceneOptions(app, options.scene);
   requireOneOutput(app, {"--output", "--preview", "--deep"});
+  options.app = &app;
+}
+
+/// Marches or path traces. Light that is made stays with the run under `key`.
+RenderResult pictureOf(const PictureOptions& picture, const std::shared_ptr<const RenderVolume>& volume,
+                       const Camera& camera, const std::string& key, Run& run) {
+  if (picture.pathTraced) return picture.picture(*volume, camera, run);
+  const bool isLit = run.lit.kept() != nullptr;
+  const auto& lit = run.lit.at(key, [&] {
+    return std::make_shared<const LitCloud>(
+        LitCloud{volume, LitVolume(*volume, picture.medium, picture.lights, picture.render.octaves, run,
+                                   picture.render.surfaces)});
+  });
+  RenderResult result = lit->light.render(camera, picture.marched(camera), run);
+  if (!isLit) result.lightSeconds = lit->light.lightSeconds();
+  return result;
 }
 
 void renderVolume(const RenderVerbOptions& options, Run& run) {
@@ -35,18 +54,23 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
                               files, run);
-  RenderVolume volume = scene.volume(picture, run);
-  picture = picture.resolved(volume, run);
-  scene.addTo(picture, volume, !options.files.preview.empty(), run);
+  const std::string key = lightKey(*options.app, scene, picture, run);
+  // Two volumes never stand side by side.
+  if (key.empty() || !run.lit.isAt(key)) run.lit.forget();
+  const LitVolume* light = run.lit.kept() ? &run.lit.kept()->light : nullptr;
+  const auto made = light ? nullptr : std::make_shared<RenderVolume>(scene.volume(picture, run));
+  const std::shared_ptr<const RenderVolume> volume = light ? run.lit.kept()->volume : made;
+  picture = picture.resolved(*volume, run, light);
+  scene.addTo(picture, *volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();
   if (!scene.holdout.empty())
     picture.render.holdout = readHoldout(scene.holdout, camera, run.memoryLimitBytes);
-  run.requireMemory(double(volume.memoryBytes()) + picture.estimateBytes(volume, camera),
+  run.requireMemory(double(volume->memoryBytes()) + picture.estimateBytes(*volume, camera),
                     "make the picture smaller (--size), or the volume with larger voxels");
-  picture.light.writeShadows(volume, picture.lights, picture.medium, run);
-  if (!picture.needsSamples()) volume.giveUpSamples();
+  picture.light.writeShadows(*volume, picture.lights, picture.medium, run);
+  if (made && !picture.needsSamples()) made->giveUpSamples();
   LivePicture live(picture.displayServer, files.name(), picture.render);
-  RenderResult result = picture.picture(volume, camera, run);
+  RenderResult result = pictureOf(picture, volume, camera, key, run);
   picture.addSky(result.image, camera, picture.lights);
   run.begin("write");
   files.write(result, camera, picture.screen, picture.metadata(run));

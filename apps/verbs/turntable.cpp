@@ -58,7 +58,7 @@ Camera firstCamera(const TurntableOptions& options, const PictureOptions& pictur
 
 void makeTurntable(const TurntableOptions& options, Run& run) {
   if (options.turns == 0) refuseValue("--turns", "0", "a number from -1000 to 1000 that is not 0");
-  TurntablePlan plan(options);
+  TurntablePlan plan(options, run);
   if (plan.frames.empty()) return run.note("no frame of --frames is in this share; nothing to do");
   PictureOptions picture = options.picture.withView();
   run.expect(0, 0.05, 4);

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele::test {
 namespace {
@@ -248,6 +250,51 @@ TEST_F(Sequences, TakeTheFrameOfACameraFile) {
   for (int frame = 1; frame <= 3; ++frame)
     EXPECT_NEAR(double(readImageCamera(path("f", frame, "exr"))->worldToCamera[12]), -0.5 * (frame - 1),
                 1e-5);
+}
+
+// Light is made for the first frame alone, and every picture is that of a call of its own, to the last bit.
+TEST_F(Sequences, OfAStillVolumeAreLitOnce) {
+  std::ofstream(folder.file("move.chan")) << "1 0 0 6 0 0 0 35\n3 1 0.5 6 0 5 0 35\n";
+  writeMesh(folder.file("o.1.obj"), boxMesh({-1, -1, -1}, {-0.5f, -0.5f, -0.5f}));
+  writeMesh(folder.file("o.2.obj"), boxMesh({-1, -1, -1}, {-0.5f, -0.5f, 0.5f}));
+  fs::copy_file(folder.file("o.2.obj"), folder.file("o.3.obj"));
+  const std::string call = fmt::format(
+      "render '{}' -o {} --size 32x24 --quality draft --samples 1 --camera '{}' --stats '{}' ",
+      path("ball", 3, "vdb"), pattern("s", "exr"), folder.file("move.chan"), folder.file("s.json"));
+  const struct {
+    std::string options, lit;
+  } cases[] = {
+      {"--deep " + pattern("d", "exr"), "100"},
+      // Two lights of which one needs samples, and layers that do.
+      {"--point 0,0,4,20 --sun 90,38 --aov normal,Z --ground --preview " + pattern("p", "png"), "100"},
+      {"--shutter -0.25,0.25", "100"},
+      // The second object is another; the third is the same under another name.
+      {"--object '" + folder.file("o.#.obj") + "'", "110"},
+      // The frame is the time.
+      {"--color '=(time / 3, 1, 0.5)'", "111"}};
+  for (const auto& c : cases) {
+    succeeds(call + "--frames 1-3 " + c.options);
+    std::string lit;
+    const auto stats = statistics();
+    for (const auto& frame : stats["frames"]) lit += double(frame["light_seconds"]) > 0 ? '1' : '0';
+    EXPECT_EQ(lit, c.lit) << c.options;
+    std::vector<Image> together;
+    for (int frame = 1; frame <= 3; ++frame) together.push_back(readImage(path("s", frame, "exr")));
+    EXPECT_NE(together[0].channel("G").values, together[1].channel("G").values) << c.options;
+    // What is chosen from objects that vary is chosen from the range.
+    const bool varies = c.options.starts_with("--object");
+    for (int frame = 1; frame <= 3; ++frame) {
+      succeeds(call + (varies ? "--frames 1-3 --only " : "--frames ") + std::to_string(frame) + " " +
+               c.options);
+      const Image alone = readImage(path("s", frame, "exr"));
+      ASSERT_EQ(alone.channels.size(), together[std::size_t(frame - 1)].channels.size());
+      for (const Image::Channel& channel : alone.channels) {
+        const auto& other = together[std::size_t(frame - 1)].channel(channel.name).values;
+        EXPECT_EQ(std::memcmp(channel.values.data(), other.data(), other.size() * sizeof(float)), 0)
+            << c.options << ' ' << frame << ' ' << channel.name;
+      }
+    }
+  }
 }
 
 TEST_F(Sequences, AreRefusedInWords) {

@@ -116,7 +116,7 @@ void ObjectOptions::addTo(PictureOptions& picture, const RenderVolume& volume, b
   for (const auto& [option, isGiven] : ofObjects)
     if (isGiven && objects.empty())
       throw CLI::ValidationError(option, "needs objects; give --object, or a mesh as the input");
-  picture.render.surfaces = surfaces(volume, picture.seen, mostBytes);
+  if (!picture.render.surfaces) picture.render.surfaces = surfaces(volume, picture.seen, mostBytes);
   picture.backdrop = showsBackdrop(picture, isShown);
 }
 

@@ -39,8 +39,8 @@ struct ObjectOptions {
   void lift(CameraOptions& camera) const;
   /// Whether a picture that is shown on screens, or not, has the sky behind it.
   bool showsBackdrop(const PictureOptions& picture, bool isShown) const;
-  /// Puts them into `picture`, which is resolved, and is shown on screens, too, or not. @throws CLI::Error
-  /// for options of objects where there are none, Error as `surfaces`.
+  /// Puts them into `picture`, which is resolved, and is shown on screens, too, or not; they are read where
+  /// it has none. @throws CLI::Error for options of objects where there are none, Error as `surfaces`.
   void addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown, double mostBytes) const;
 };
 

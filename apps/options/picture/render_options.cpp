@@ -148,7 +148,7 @@ Extent extentOf(const RenderVolume& volume) {
 }
 
 PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& run,
-                                        const Lights* made) const {
+                                        const LitVolume* lit) const {
   PictureOptions result = *this;
   static_cast<CameraOptions&>(result) = placed(extentOf(volume), run);
   result.chooseByScale(volume, run);
@@ -158,7 +158,8 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
   result.chooseByQuality(volume);
-  result.lights = made ? *made : light.resolved(result.seen.longestSide, run.memoryLimitBytes);
+  result.lights = lit ? lit->lights() : light.resolved(result.seen.longestSide, run.memoryLimitBytes);
+  if (lit) result.render.surfaces = lit->surfaces();
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
   std::erase(result.render.aovs, "none");

@@ -55,8 +55,9 @@ struct PictureOptions : CameraOptions {
   /// @throws CLI::ValidationError or Error if there is no such view.
   PictureOptions withView(ViewCurve otherwise = ViewCurve::filmic) const;
   /// These options with everything filled in that follows from `volume`, or in a sequence from all of them.
-  /// `made`: the lights of these options, where they have been made before.
-  PictureOptions resolved(const RenderVolume& volume, const Run& run, const Lights* made = nullptr) const;
+  /// `lit`: the volume in the light of these options, where that has been made before: its lights and objects
+  /// serve again.
+  PictureOptions resolved(const RenderVolume& volume, const Run& run, const LitVolume* lit = nullptr) const;
   /// Whether a still reads the samples of the volume's grid after its light has been made.
   bool needsSamples() const;
   /// Whether a density that is coded is enough for all of it.
