@@ -1,9 +1,9 @@
 // Frames, movie and contact sheet of the verb turntable.
 //
 // The light is made once where it does not move as the volume sees it, and the sky's part of it once in any
-// case. The movie and the sheet are made of the files in the end, so that they are the same whether frames
-// were made now or by an earlier call; or of the frames as they are made, rounded as files would, where there
-// are to be no files.
+// case; with a script that is sampled anew, anew. The movie and the sheet are made of the files in the end,
+// so that they are the same whether frames were made now or by an earlier call; or of the frames as they are
+// made, rounded as files would, where there are to be no files.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -50,13 +50,11 @@ class FrameProgress : public SubProgress {
 // Makes one frame after another of a volume.
 class FrameMaker {
  public:
-  FrameMaker(const PictureOptions& picture, const RenderVolume& volume, const Turntable& turntable,
-             const Camera& start, const Progress& progress)
-      : picture_(picture), volume_(volume), turntable_(turntable), start_(start) {
-    if (!picture.pathTraced && !turntable.lightsMove())
-      light_.emplace(volume, picture.medium, picture.lights, picture.render.octaves, progress,
-                     picture.render.surfaces);
-    lightSeconds_ = light_ ? light_->lightSeconds() : 0;
+  FrameMaker(const PictureOptions& picture, SceneVolume& scene, const Turntable& turntable,
+             const Camera& start, int first, const Run& run)
+      : picture_(picture), scene_(scene), turntable_(turntable), start_(start), run_(run) {
+    sampleFor(camera(first), run);
+    if (!picture_.pathTraced && !turntable.lightsMove()) makeLight(picture_.lights, run);
   }
 
   Camera camera(int frame) const {
@@ -72,20 +70,15 @@ class FrameMaker {
 
   RenderResult make(int frame, const Camera& camera, const std::shared_ptr<const Holdout>& holdout,
                     const Progress& progress) {
+    sampleFor(camera, progress);
     if (picture_.pathTraced) {
       PictureOptions picture = picture_;
       picture.render.holdout = holdout;
       picture.lights = turntable_.lights(picture_.lights, frame);
       if (picture_.shutter.isInstant()) picture.render.nextCamera = turntable_.camera(start_, frame + 1);
-      return picture.picture(volume_, camera, progress);
+      return picture.picture(scene_.volume(), camera, progress);
     }
-    if (turntable_.lightsMove()) {
-      const Lights lights = turntable_.lights(picture_.lights, frame);
-      light_ = light_ ? light_->underOther(lights, progress)
-                      : LitVolume(volume_, picture_.medium, lights, picture_.render.octaves, progress,
-                                  picture_.render.surfaces);
-      lightSeconds_ += light_->lightSeconds();
-    }
+    if (turntable_.lightsMove() || !light_) makeLight(turntable_.lights(picture_.lights, frame), progress);
     RenderOptions options = picture_.marched(camera);
     options.holdout = holdout;
     if (picture_.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
@@ -93,12 +86,33 @@ class FrameMaker {
   }
 
   double lightSeconds() const { return lightSeconds_; }
+  float voxelSize() const { return scene_.volume().density().voxelSize(); }
 
  private:
-  const PictureOptions& picture_;
-  const RenderVolume& volume_;
+  // What is looked at, as this camera shows it; with other voxels, the light of before is of no use.
+  void sampleFor(const Camera& camera, const Progress& progress) {
+    const std::optional<float> voxelSize = scene_.otherVoxels(camera, progress);
+    if (!voxelSize) return;
+    light_.reset();
+    scene_.resample(*voxelSize, progress);
+    const RenderVolume& volume = scene_.volume();
+    picture_.render.step = picture_.stepThrough(volume);
+    run_.requireMemory(double(volume.memoryBytes()) + picture_.estimateBytes(volume, camera),
+                       "make the picture smaller (--size)");
+  }
+
+  void makeLight(const Lights& lights, const Progress& progress) {
+    light_ = light_ ? light_->underOther(lights, progress)
+                    : LitVolume(scene_.volume(), picture_.medium, lights, picture_.render.octaves, progress,
+                                picture_.render.surfaces);
+    lightSeconds_ += light_->lightSeconds();
+  }
+
+  PictureOptions picture_;
+  SceneVolume& scene_;
   const Turntable& turntable_;
   const Camera& start_;
+  const Run& run_;
   std::optional<LitVolume> light_;
   double lightSeconds_ = 0;
 };
@@ -197,10 +211,10 @@ void makeReel(const TurntablePlan& plan, const TurntableOptions& options, Reel& 
 }  // namespace
 
 void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& given,
-                const RenderVolume& volume, const Camera& start, Run& run) {
+                SceneVolume& scene, const Camera& start, Run& run) {
   PictureOptions picture = given;
   LivePicture live(picture.displayServer, options.name(), picture.render);
-  const Vec3f middle = volume.isEmpty() ? Vec3f{} : volume.worldBounds().center();
+  const Vec3f middle = scene.volume().isEmpty() ? Vec3f{} : scene.volume().worldBounds().center();
   const Turntable turntable(options.orbit, middle, plan.first, plan.last, options.turns);
   std::vector<TurntableFrame*> missing;
   for (TurntableFrame& frame : plan.frames) {
@@ -214,7 +228,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   Reel reel(options, int(plan.frames.size()), picture.screen);
   FrameWriter writer(picture.screen, reel);
   std::optional<FrameMaker> maker;
-  if (!missing.empty()) maker.emplace(picture, volume, turntable, start, run);
+  if (!missing.empty()) maker.emplace(picture, scene, turntable, start, missing.front()->number, run);
   run.expect(0.05, reel.isWanted() && !options.output.empty() ? 0.95 : 1.0);
   run.begin("frames");
   for (std::size_t i = 0; i != missing.size(); ++i) try {
@@ -241,6 +255,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       writer.write(frame, std::move(result), camera, std::move(metadata));
       if (i + 1 == missing.size()) writer.finish();
       frame.seconds = secondsSince(began);
+      frame.voxelSize = maker->voxelSize();
       run.advance(double(i + 1) / double(missing.size()));
     } catch (const Cancelled&) {
       writer.finish();
@@ -257,9 +272,11 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   if (!options.scene.deep.empty()) run.stats["deep_samples"] = deepSamples;
   run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;
   run.stats["march_seconds"] = marchSeconds;
-  for (const TurntableFrame& frame : plan.frames)
-    run.stats["frames"].push_back(
-        {{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}});
+  for (const TurntableFrame& frame : plan.frames) {
+    nlohmann::json made{{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}};
+    if (!frame.skipped) made["voxel_size"] = frame.voxelSize;
+    run.stats["frames"].push_back(std::move(made));
+  }
   makeReel(plan, options, reel, run);
 }
 

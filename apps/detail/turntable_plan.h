@@ -36,6 +36,8 @@ struct TurntableFrame {
   /// The files are there and whole, and are left as they are.
   bool skipped = false, previewSkipped = false;
   double seconds = 0;
+  /// That it was made of.
+  float voxelSize = 0;
 };
 
 /// What a call of the verb has to make.
@@ -62,8 +64,9 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run);
 
 /// Makes the frames that are not skipped, one after another, each on all threads: frames side by side would
 /// need the memory of as many pictures, and be no faster. Then makes the movie and the contact sheet, where
-/// they are wanted, of all frames. Fills in the frames' seconds and the run's statistics.
+/// they are wanted, of all frames. A script is sampled anew for every camera that asks for other voxels, and
+/// so is its light. Fills in the frames' seconds and the run's statistics.
 void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
-                const RenderVolume& volume, const Camera& start, Run& run);
+                SceneVolume& scene, const Camera& start, Run& run);
 
 }  // namespace nephele::apps

@@ -63,7 +63,8 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   PictureOptions picture = options.picture.withView();
   run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
-  const RenderVolume volume = options.scene.volume(picture, run);
+  SceneVolume scene = options.scene.sceneVolume(picture, run);
+  const RenderVolume& volume = scene.volume();
   picture = picture.resolved(volume, run);
   const bool isShown = !options.preview.empty() || !options.movie.empty() || !options.contactSheet.empty();
   options.scene.addTo(picture, volume, isShown, run);
@@ -75,7 +76,7 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
                     "make the picture smaller (--size), or the volume with larger voxels");
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
   if (options.skipExisting) skipExisting(plan, start, run);
-  makeFrames(plan, options, picture, volume, start, run);
+  makeFrames(plan, options, picture, scene, start, run);
   run.stats["extinction"] = *picture.extinction;
   run.result(fmt::format("{}: {} frames, {} of them skipped, {}x{}, extinction {:g} per world unit",
                          options.name(), plan.frames.size(),

@@ -68,18 +68,14 @@ double narrowestPixel(const Camera& camera, const Box& box) {
   return isShown ? camera.pixelWidth(std::max(nearest, 0.0)) : std::numeric_limits<double>::infinity();
 }
 
-double narrowest(const ScalarField& density, const std::vector<Camera>& cameras, const Box& box, int level,
-                 const Progress& progress) {
-  if (!(density.range(box).max > 0)) return std::numeric_limits<double>::infinity();
-  double least = std::numeric_limits<double>::infinity();
-  for (const Camera& camera : cameras) least = std::min(least, narrowestPixel(camera, box));
-  if (level == 0 || std::isinf(least)) return least;
+// Boxes that may hold density, so many levels of octants down.
+void findDense(const ScalarField& density, const Box& box, int level, std::vector<Box>& found,
+               const Progress& progress) {
+  if (!(density.range(box).max > 0)) return;
+  if (level == 0) return found.push_back(box);
   progress.check();
   const ScalarField here = density.restrictedTo(box);
-  least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i != 8; ++i)
-    least = std::min(least, narrowest(here, cameras, octant(box, i), level - 1, progress));
-  return least;
+  for (int i = 0; i != 8; ++i) findDense(here, octant(box, i), level - 1, found, progress);
 }
 
 // Bricks with values of their own that voxels of this size need, up to a little more than `most`.
@@ -103,6 +99,7 @@ void check(const FieldVolumeOptions& options) {
           "field volume: expected a box that is bounded and not empty");
   require(std::isfinite(options.voxelsPerPixel) && options.voxelsPerPixel > 0,
           fmt::format("voxels per pixel: expected a finite number > 0, got {}", options.voxelsPerPixel));
+  require(options.sizesPerOctave >= 0, "sizes per octave: expected 0 or more");
   require(options.mostBytes > 0, fmt::format("most bytes: expected a number > 0, got {}", options.mostBytes));
 }
 
@@ -119,23 +116,43 @@ VectorField notNegative(const VectorField& field) {
 
 }  // namespace
 
-float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
-                     const Progress& progress) {
-  check(options);
+FieldResolution::FieldResolution(const ScalarField& density, const FieldVolumeOptions& options,
+                                 const Progress& progress)
+    : density_(density), options_(options) {
+  check(options_);
+  findDense(density_, options_.box, kLevels, dense_, progress);
+}
+
+float FieldResolution::voxelSize(const Camera& camera, const Progress& progress) {
   std::vector<Camera> cameras{camera};
   if (camera.isMoving()) cameras = {camera.stillAt(0), camera.stillAt(0.5), camera.stillAt(1)};
-  const float side = options.box.longestSide();
-  const double pixel = narrowest(density, cameras, options.box, kLevels, progress);
-  float voxelSize = std::isinf(pixel) ? side / 64 : float(pixel / double(options.voxelsPerPixel));
-  voxelSize = std::max(voxelSize, kFinest * side);
+  double pixel = std::numeric_limits<double>::infinity();
+  for (const Camera& each : cameras)
+    for (const Box& box : dense_) pixel = std::min(pixel, narrowestPixel(each, box));
+  const float side = options_.box.longestSide();
+  float size = std::isinf(pixel) ? side / 64 : float(pixel / double(options_.voxelsPerPixel));
+  size = std::max(size, kFinest * side);
+  const double perOctave = options_.sizesPerOctave;
+  if (perOctave > 0)
+    size = side * float(std::exp2(std::floor(std::log2(double(size / side)) * perOctave) / perOctave));
+  const float growth = perOctave > 0 ? float(std::exp2(1 / perOctave)) : 1.25f;
+  while (size * BrickGrid::kBrick < side && !fits(size, progress)) size *= growth;
+  return size;
+}
 
+bool FieldResolution::fits(float voxelSize, const Progress& progress) {
+  const auto [known, isNew] = fits_.try_emplace(voxelSize, false);
+  if (!isNew) return known->second;
   // A cube about the box, so that octants end as cubes; it does not matter how far it reaches beyond.
-  const Vec3f size{side, side, side};
-  const Box cube{options.box.min, options.box.min + size};
-  const double most = std::max(options.mostBytes / (BrickGrid::kVolume * sizeof(float)), 1.0);
-  while (voxelSize * BrickGrid::kBrick < side && brickCount(density, cube, voxelSize, most, progress) > most)
-    voxelSize *= 1.25f;
-  return voxelSize;
+  const float side = options_.box.longestSide();
+  const Box cube{options_.box.min, options_.box.min + Vec3f{side, side, side}};
+  const double most = std::max(options_.mostBytes / (BrickGrid::kVolume * sizeof(float)), 1.0);
+  return known->second = brickCount(density_, cube, voxelSize, most, progress) <= most;
+}
+
+float fieldVoxelSize(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,
+                     const Progress& progress) {
+  return FieldResolution(density, options, progress).voxelSize(camera, progress);
 }
 
 RenderVolume fieldVolume(const ScalarField& density, const Camera& camera, const FieldVolumeOptions& options,

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <vector>
 
 #include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/progress.h"
@@ -19,6 +21,29 @@ struct FieldVolumeOptions {
   float voxelsPerPixel = 1.0f;
   /// Bytes that the bricks may take; voxels grow until they fit.
   double mostBytes = 1e9;
+  /// Voxels are of one of so many sizes while they double, the next smaller one, so that cameras from about
+  /// as far away share them. 0: of any size.
+  int sizesPerOctave = 0;
+};
+
+/// The voxel sizes of a field for one camera after another. Not for several threads at once.
+class FieldResolution {
+ public:
+  /// Cost: ranges of the field over some 10^4 boxes. @throws Error as fieldVoxelSize; Cancelled.
+  FieldResolution(const ScalarField& density, const FieldVolumeOptions& options,
+                  const Progress& progress = silent());
+  /// See fieldVoxelSize. Cost: some milliseconds, and as much as the constructor for a size that is new, to
+  /// learn whether it fits into the memory. @throws Cancelled.
+  float voxelSize(const Camera& camera, const Progress& progress = silent());
+
+ private:
+  bool fits(float voxelSize, const Progress& progress);
+
+  ScalarField density_;
+  FieldVolumeOptions options_;
+  // Where there may be density.
+  std::vector<Box> dense_;
+  std::map<float, bool> fits_;
 };
 
 /// The voxel size of `fieldVolume`, world units: the width of a pixel there, over voxelsPerPixel, but no less

@@ -92,5 +92,54 @@ TEST_F(TurntableVerb, RefusesDepthThatDoesNotFit) {
   fails("--holdout '" + folder.file("d.0001.exr") + "'", 1, "d.0001.exr");
 }
 
+// Long in x: nearer, and so finer, where the camera looks along it. Frames are those of render with the same
+// camera.
+TEST_F(TurntableVerb, SamplesAScriptForTheCameraOfEveryFrame) {
+  const std::string script = folder.file("long.felt");
+  std::ofstream(script) << "domain bounds = domain((-2.4, -0.8, -0.8), (4.8, 1.6, 1.6), 0.1);\n"
+                           "scalarfield density = mask(0.5 - sqrt((P.x / 4)^2 + P.y^2 + P.z^2), 0.05);\n"
+                           "float extinction = 4;\n";
+  const std::string common = " --size 48x32 --samples 1 --sun 30,20 --look-at 0,0,0 ";
+  const auto turn = [&](const std::string& options) {
+    const ProgramResult result = runProgram("turntable " + script + " -o " + folder.file("f.####.exr") +
+                                            " --frames 1-4 --camera-position 0,0,5 --stats " +
+                                            folder.file("s.json") + common + options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    std::vector<double> sizes;
+    const nlohmann::json stats = statistics();
+    for (const auto& frame : stats["frames"]) sizes.push_back(frame["voxel_size"]);
+    return sizes;
+  };
+  const auto expectTheSame = [](const std::string& a, const std::string& b) {
+    const Image first = readImage(a), second = readImage(b);
+    for (const char* channel : {"R", "G", "B", "A", "Z"}) {
+      const std::vector<float>&x = first.channel(channel).values, &y = second.channel(channel).values;
+      // Rounded to 16 bits, one way or the other.
+      for (std::size_t i = 0; i != x.size(); ++i)
+        ASSERT_LE(x[i] == y[i] ? 0 : std::fabs(x[i] - y[i]), 1e-3f * std::fabs(y[i])) << a << channel;
+    }
+  };
+  const std::vector<double> sizes = turn("");
+  ASSERT_EQ(sizes.size(), 4u);
+  EXPECT_EQ(sizes[0], sizes[2]);
+  EXPECT_EQ(sizes[1], sizes[3]);
+  // 5 - 0.5 and 5 - 2 away, in steps of an eighth of an octave.
+  EXPECT_NEAR(sizes[0] / sizes[1], 1.5, 0.2);
+  const std::string still = folder.file("still.exr");
+  for (const auto& [number, position] : {std::pair{1, "0,0,5"}, {2, "5,0,0"}}) {
+    ASSERT_EQ(
+        runProgram("render " + script + " -o " + still + common + "--camera-position " + position).exitCode,
+        0);
+    expectTheSame(frame(number), still);
+  }
+  // Whatever other frames are made, and with lights that turn, whose camera stands still.
+  std::filesystem::rename(frame(2), folder.file("second.exr"));
+  turn("--only 2");
+  expectTheSame(frame(2), folder.file("second.exr"));
+  for (const double size : turn("--orbit light")) EXPECT_EQ(size, sizes[0]);
+  turn("--orbit model");
+  EXPECT_GT(brightness(frame(2)), 0);
+}
+
 }  // namespace
 }  // namespace nephele::test

@@ -153,11 +153,11 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
   static_cast<CameraOptions&>(result) = placed(extentOf(volume), run);
   result.chooseByScale(volume, run);
   result.medium.extinction = *result.extinction;
-  if (step.value > 0) result.render.step = stepIn(volume, step, result.seen.longestSide);
   if (adaptiveThreshold > 0 && pathTraced)
     refuseValue("--adaptive", fmt::format("{:g}", adaptiveThreshold), "0 with --integrator path");
   result.render.adaptiveThreshold = float(adaptiveThreshold);
-  result.chooseByQuality(volume);
+  result.chooseByQuality();
+  result.render.step = result.stepThrough(volume);
   result.lights = lit ? lit->lights() : light.resolved(result.seen.longestSide, run.memoryLimitBytes);
   if (lit) result.render.surfaces = lit->surfaces();
   result.screen.background =
@@ -193,7 +193,15 @@ void PictureOptions::chooseByScale(const RenderVolume& volume, const Run& run) {
   if (!phaseGiven) medium.phase = Phase::parse(fmt::format("mie:{:g}", RealCloud::kDiameter));
 }
 
-void PictureOptions::chooseByQuality(const RenderVolume& volume) {
+std::optional<float> PictureOptions::stepThrough(const RenderVolume& volume) const {
+  if (step.value > 0) return stepIn(volume, step, seen.longestSide);
+  // The standard step is the marcher's own: longer where the density hardly varies.
+  const float voxels = QualityChoices::of(quality).stepVoxels;
+  if (voxels == 1 || volume.isEmpty()) return std::nullopt;
+  return voxels * volume.density().voxelSize();
+}
+
+void PictureOptions::chooseByQuality() {
   const QualityChoices choices = QualityChoices::of(quality);
   render.octaves.order = QualityChoices::of(lightQuality.value_or(quality)).lightOrder;
   if (!samplesGiven) render.samples = choices.samples;
@@ -203,9 +211,6 @@ void PictureOptions::chooseByQuality(const RenderVolume& volume) {
     refuseValue("--samples", std::to_string(render.samples),
                 fmt::format("a whole number from 1 to {}, but with --integrator path", kMostRays));
   if (pathTraced) render.samples = std::min(render.samples, kMostRays);
-  // The standard step is the marcher's own: longer where the density hardly varies.
-  if (!render.step && choices.stepVoxels != 1 && !volume.isEmpty())
-    render.step = choices.stepVoxels * volume.density().voxelSize();
   if (!adaptiveGiven && !pathTraced) render.adaptiveThreshold = choices.adaptiveThreshold;
 }
 

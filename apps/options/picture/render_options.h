@@ -58,6 +58,8 @@ struct PictureOptions : CameraOptions {
   /// `lit`: the volume in the light of these options, where that has been made before: its lights and objects
   /// serve again.
   PictureOptions resolved(const RenderVolume& volume, const Run& run, const LitVolume* lit = nullptr) const;
+  /// The longest step of rays through `volume`, which `resolved` chooses for its own; nothing: the marcher's.
+  std::optional<float> stepThrough(const RenderVolume& volume) const;
   /// Whether a still reads the samples of the volume's grid after its light has been made.
   bool needsSamples() const;
   /// Whether a density that is coded is enough for all of it.
@@ -77,7 +79,7 @@ struct PictureOptions : CameraOptions {
   std::map<std::string, std::string> metadata(const Run& run) const;
 
  private:
-  void chooseByQuality(const RenderVolume& volume);
+  void chooseByQuality();
   void chooseByScale(const RenderVolume& volume, const Run& run);
   // For the air alone, and not asked for as a layer.
   bool dropsMeanDepth_ = false;

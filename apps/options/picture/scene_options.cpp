@@ -6,13 +6,33 @@
 
 namespace nephele::apps {
 
-RenderVolume SceneOptions::volume(PictureOptions& picture, Run& run) const {
-  RenderVolume result =
-      isScript(inputs)
-          ? scriptVolume(inputs.front(), script, picture, run)
-          : readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run);
-  if (result.isEmpty()) run.note(inputs.front() + ": the volume is empty, and so is its picture");
+std::optional<float> SceneVolume::otherVoxels(const Camera& camera, const Progress& progress) {
+  if (!script_ || !script_->isSampled() || volume_->isEmpty()) return std::nullopt;
+  const float voxelSize = script_->voxelSize(camera, progress);
+  return voxelSize == volume_->density().voxelSize() ? std::nullopt : std::optional(voxelSize);
+}
+
+void SceneVolume::resample(float voxelSize, const Progress& progress) {
+  volume_.reset();
+  volume_ = script_->withVoxels(voxelSize, progress);
+}
+
+SceneVolume SceneOptions::sceneVolume(PictureOptions& picture, Run& run) const {
+  const auto made = [&]() -> SceneVolume {
+    if (!isScript(inputs))
+      return SceneVolume(
+          readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run));
+    ScriptVolume ran(inputs.front(), script, picture, run);
+    RenderVolume sampled = ran.forCameraOf(picture, run);
+    return {std::move(sampled), std::move(ran)};
+  };
+  SceneVolume result = made();
+  if (result.volume().isEmpty()) run.note(inputs.front() + ": the volume is empty, and so is its picture");
   return result;
+}
+
+RenderVolume SceneOptions::volume(PictureOptions& picture, Run& run) const {
+  return sceneVolume(picture, run).taken();
 }
 
 Extent SceneOptions::extent(const PictureOptions& picture, Run& run) const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/options/picture/object_options.h"
@@ -8,6 +10,27 @@
 #include "apps/options/picture/script_volume.h"
 
 namespace nephele::apps {
+
+/// What is looked at: volumes of files, read once, or a script, sampled for one camera after another.
+class SceneVolume {
+ public:
+  explicit SceneVolume(RenderVolume volume) : volume_(std::move(volume)) {}
+  /// `volume` has been sampled from `script`.
+  SceneVolume(RenderVolume volume, ScriptVolume script)
+      : volume_(std::move(volume)), script_(std::move(script)) {}
+
+  const RenderVolume& volume() const { return *volume_; }
+  RenderVolume taken() && { return *std::move(volume_); }
+  /// The voxels that `camera` asks for, where they are others than those that there are. Only of scripts that
+  /// are sampled: files have theirs, and what rays ask is as fine from everywhere.
+  std::optional<float> otherVoxels(const Camera& camera, const Progress& progress);
+  /// Samples the script anew. The volume of before is given up first, so whoever refers to it must have gone.
+  void resample(float voxelSize, const Progress& progress);
+
+ private:
+  std::optional<RenderVolume> volume_;
+  std::optional<ScriptVolume> script_;
+};
 
 /// What is in a picture, beside the options of how it is seen: volumes, objects, and what hides them.
 struct SceneOptions {
@@ -19,7 +42,9 @@ struct SceneOptions {
   ScriptOptions script;
 
   /// Reads the inputs as they are marched, all as one; notes where that is empty. A script may say an
-  /// extinction, which goes into `picture`. @throws as readVolumes and scriptVolume.
+  /// extinction, which goes into `picture`. @throws as readVolumes and ScriptVolume.
+  SceneVolume sceneVolume(PictureOptions& picture, Run& run) const;
+  /// For one camera, that of `picture`.
   RenderVolume volume(PictureOptions& picture, Run& run) const;
   /// How large the inputs are, for sequences: volumes, or shapes alone. @throws Error naming the file.
   Extent extent(const PictureOptions& picture, Run& run) const;

@@ -10,7 +10,6 @@
 #include "nephele/levelset/felt/field_extent.h"
 #include "nephele/modeling/felt/program.h"
 #include "nephele/modeling/field/operations.h"
-#include "nephele/render/volume/field_volume.h"
 
 namespace nephele::apps {
 
@@ -21,9 +20,6 @@ struct ScriptScene {
   FieldParts parts;
   std::optional<double> extinction;
   std::optional<Vec3d> sky, sun;
-
-  bool hasOthers() const { return parts.colour || needsGrid(); }
-  bool needsGrid() const { return parts.emission || parts.velocity || parts.temperature; }
 };
 
 /// The share of the memory allowed that the samples of a script may take; the light takes as much again.
@@ -31,6 +27,7 @@ constexpr double kMemoryShare = 0.25;
 constexpr double kMostBytes = 4e9;
 /// Voxels along the box in which a script is looked at to frame it.
 constexpr int kCoarse = 96;
+constexpr int kSizesPerOctave = 8;
 
 class Declared {
  public:
@@ -151,32 +148,49 @@ bool isScript(const std::vector<std::string>& paths) {
   return true;
 }
 
-RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture,
-                          Run& run) {
-  const ScriptScene scene = runScript(path, options, picture, run);
+ScriptVolume::ScriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture,
+                           Run& run)
+    : path_(path), isExact_(options.detail == ScriptOptions::Detail::exact) {
+  ScriptScene scene = runScript(path, options, picture, run);
   suggest(path, scene, picture);
-  const bool isExact = options.detail == ScriptOptions::Detail::exact;
-  if (isExact && scene.needsGrid())
+  parts_ = std::move(scene.parts);
+  if (isExact_ && (parts_.emission || parts_.velocity || parts_.temperature))
     throw Error(path +
                 ": --detail exact shows a density and its color, without emission, temperature or velocity; "
                 "--detail camera shows them");
-  return namingFile(path, [&] {
+}
+
+RenderVolume ScriptVolume::forCameraOf(const PictureOptions& picture, Run& run) {
+  return namingFile(path_, [&] {
     // What the camera frames shows only once the script has been looked at.
-    const FieldParts& parts = scene.parts;
-    const float side = parts.box.longestSide();
+    const float side = parts_.box.longestSide();
     const RenderVolume coarse =
-        sampledVolume({.density = parts.density, .box = parts.box}, side / kCoarse, run);
+        sampledVolume({.density = parts_.density, .box = parts_.box}, side / kCoarse, run);
     if (coarse.isEmpty()) return coarse;
+    const bool hasOthers = parts_.colour || parts_.emission || parts_.velocity || parts_.temperature;
+    const double bytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes);
+    resolution_.emplace(parts_.density,
+                        FieldVolumeOptions{.box = parts_.box,
+                                           .voxelsPerPixel = isExact_ ? 0.5f : 1.0f,
+                                           .mostBytes = hasOthers ? bytes / 4 : bytes,
+                                           .sizesPerOctave = kSizesPerOctave},
+                        run);
     const Camera camera = static_cast<const CameraOptions&>(picture).placed(extentOf(coarse), run).camera();
-    FieldVolumeOptions field{.box = parts.box,
-                             .voxelsPerPixel = isExact ? 0.5f : 1.0f,
-                             .mostBytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes)};
-    if (scene.hasOthers()) field.mostBytes /= 4;
-    const float voxelSize = fieldVoxelSize(parts.density, camera, field, run);
-    run.detail(
-        fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path, voxelSize, side / voxelSize));
-    run.stats["script"] = {{"voxel_size", voxelSize}, {"exact", isExact}};
-    return isExact ? gridlessVolume(parts, voxelSize, run) : sampledVolume(parts, voxelSize, run);
+    const float size = voxelSize(camera, run);
+    run.detail(fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path_, size, side / size));
+    run.stats["script"] = {{"voxel_size", size}, {"exact", isExact_}};
+    return withVoxels(size, run);
+  });
+}
+
+float ScriptVolume::voxelSize(const Camera& camera, const Progress& progress) {
+  return resolution_->voxelSize(camera, progress);
+}
+
+RenderVolume ScriptVolume::withVoxels(float voxelSize, const Progress& progress) const {
+  return namingFile(path_, [&] {
+    return isExact_ ? gridlessVolume(parts_, voxelSize, progress)
+                    : sampledVolume(parts_, voxelSize, progress);
   });
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "apps/options/picture/render_options.h"
+#include "nephele/render/volume/field_volume.h"
 
 namespace nephele::apps {
 
@@ -28,7 +30,7 @@ void addScriptOptions(CLI::App& app, ScriptOptions& options);
 /// several.
 bool isScript(const std::vector<std::string>& paths);
 
-/// Runs the script and makes what it declares into a volume for the camera of `picture`:
+/// A script as a volume that is sampled for one camera or another. What it declares of one:
 ///
 ///     scalarfield density          what is looked at, per world unit; values below 0 count as 0
 ///     domain bounds                where it is; not declared: found from the field's ranges
@@ -40,9 +42,28 @@ bool isScript(const std::vector<std::string>& paths);
 ///     vector sky                   radiance of the sky, where --sky is not given
 ///     vector sun                   azimuth, elevation and irradiance, where no light is given
 ///
-/// `time` is the frame, `seed` that of the picture. @throws felt::ScriptError; Error naming the file where it
-/// declares no density, or one that ends nowhere.
-RenderVolume scriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture,
-                          Run& run);
+class ScriptVolume {
+ public:
+  /// Runs the script; what it says of the picture goes into `picture`. `time` is the frame, `seed` that of
+  /// the picture. @throws felt::ScriptError; Error naming the file where it declares no density, or one that
+  /// ends nowhere.
+  ScriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture, Run& run);
+
+  /// Whether voxels stand between the script and the picture.
+  bool isSampled() const { return !isExact_; }
+  /// As it is to be seen through the camera of `picture`.
+  RenderVolume forCameraOf(const PictureOptions& picture, Run& run);
+  /// The voxels that `camera` asks for: as wide as a pixel, or up to 9 % less, so that cameras that see it
+  /// from about as far away share them.
+  float voxelSize(const Camera& camera, const Progress& progress);
+  /// Depends on nothing else.
+  RenderVolume withVoxels(float voxelSize, const Progress& progress) const;
+
+ private:
+  std::string path_;
+  FieldParts parts_;
+  bool isExact_;
+  std::optional<FieldResolution> resolution_;
+};
 
 }  // namespace nephele::apps

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
@@ -46,6 +47,36 @@ TEST(FieldVolume, AnOrthographicCameraSeesPixelsOfOneWidth) {
   frame.orthographicWidth = 3.0f;
   const Camera camera = Camera::lookingAt({0, 0, 9}, {0, 0, 0}, {0, 1, 0}, frame);
   EXPECT_FLOAT_EQ(fieldVoxelSize(cotton(), camera, around(2)), 0.06f);
+}
+
+TEST(FieldVolume, SizesOfAnOctaveAreSharedByCamerasFromAboutAsFarAway) {
+  FieldVolumeOptions options = around(2);
+  options.sizesPerOctave = 8;
+  FieldResolution resolution(cotton(), options);
+  std::set<float> sizes;
+  for (int i = 0; i != 50; ++i) {
+    const Camera camera = looking({0, 0, 6 + 0.12f * float(i)}, 100, 20);
+    const float size = resolution.voxelSize(camera), exact = fieldVoxelSize(cotton(), camera, around(2));
+    EXPECT_LE(size, exact * 1.0001f);
+    EXPECT_GT(size, exact / 1.0906f);
+    // As if it had been asked for alone.
+    EXPECT_EQ(size, fieldVoxelSize(cotton(), camera, options));
+    sizes.insert(size);
+  }
+  // From 5 to 11 away: 9 eighths of an octave.
+  EXPECT_GE(sizes.size(), 9u);
+  EXPECT_LE(sizes.size(), 11u);
+  for (const float size : sizes)
+    EXPECT_NEAR(8 * std::log2(4 / size), std::round(8 * std::log2(4 / size)), 1e-4);
+}
+
+TEST(FieldVolume, SizesOfAnOctaveGrowUntilTheyFit) {
+  FieldVolumeOptions options = around(2);
+  options.sizesPerOctave = 8;
+  options.mostBytes = 4e6;
+  const Camera camera = looking({0, 0, 9}, 400, 20);
+  const float size = fieldVoxelSize(cotton(), camera, options);
+  EXPECT_GT(size, 1.5f * fieldVoxelSize(cotton(), camera, around(2)));
 }
 
 TEST(FieldVolume, OnlyWhatThePictureShowsCounts) {
