@@ -19,6 +19,8 @@ const Names kOfShape{"species", "shape-seed", "shape-size", "combine", "blend", 
 const Names kOfDensity{"half",      "edge-thickness", "density",          "edge-falloff",
                        "flat-base", "interior-noise", "height-profile",   "thin-out",
                        "advect",    "advect-steps",   "advect-frequency", "wind"};
+// And those that the first layer does not depend on.
+const Names kOfLaterLayers{"lacunarity", "roughness", "billow", "billow-scale"};
 // Options of the verb render.
 const Names kOfLights{"sun", "point",         "spot",         "light-decay",   "shadow-multiplier",
                       "sky", "ground-albedo", "sky-rotation", "sky-intensity", "sky-encoding"};
@@ -159,6 +161,21 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
                  });
   keys.medium = keyOf(ofRender, [](const std::string& name) { return isIn(kOfMedium, name); });
   keys.lights = keyOf(ofRender, [](const std::string& name) { return isIn(kOfLights, name); });
+  return keys;
+}
+
+std::vector<std::string> LookPlan::layerKeys() const {
+  std::string files;
+  for (const std::string& file : cloud.maskFiles()) files += fileStamp(file) + ";";
+  std::vector<std::string> keys;
+  for (std::size_t i = 0; i < std::size_t(cloud.layerCount()); ++i)
+    keys.push_back(files +
+                   keyOf(settings["cloud"],
+                         [&](const std::string& name) {
+                           return !isIn(kOfShape, name) && !isIn(kOfDensity, name) && name != "recipe" &&
+                                  name != "layers" && !(i == 0 && isIn(kOfLaterLayers, name));
+                         }) +
+                   (i < cloud.recipe.size() ? cloud.recipe[i].text : ""));
   return keys;
 }
 

@@ -39,6 +39,8 @@ struct LookPlan {
   PictureOptions pictureOf(Tier tier) const;
   /// Of all steps; layers reach as far as the edge does, which is not in their key, see cloudEdgeReach.
   PictureStages::Keys keys(Tier tier) const;
+  /// Of each layer of the cloud, beside the shape and the layers before it, see PictureStages::levels.
+  std::vector<std::string> layerKeys() const;
   /// Of all that a picture depends on beside its light, its size and what it shows.
   std::string cameraKey() const;
 

@@ -85,7 +85,7 @@ std::unique_ptr<LookTier::Growing> LookTier::grown(const LookPlan& plan, Run& ru
   const float edge = options.edgeThickness.range(Box::everywhere()).max;
   reaches_[keys.shape + keys.levels + keys.volume] =
       fmt::format("reach={:g}", cloudEdgeReach(edge, options.voxelSize));
-  growing->levels = stages_.levels(keysOf(plan).levels, options, run);
+  growing->levels = stages_.levels(keysOf(plan).levels, options, plan.layerKeys(), run);
   return growing;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "apps/options/cloud_quantities.h"
 #include "apps/options/toml_file.h"
@@ -159,6 +160,7 @@ void set(LayerRecipe& layer, const Entry& entry) {
 LayerRecipe recipeOf(TomlFile& file, const toml::table& table) {
   LayerRecipe layer;
   layer.place = "--recipe: " + file.placeOf(table);
+  layer.text = (std::ostringstream() << table).str();
   for (const auto& [name, value] : table) file.collect([&] { set(layer, Entry(file, name, value)); });
   const auto needs = [&](const char* key, const char* other) {
     if (const auto found = table.find(key); found != table.end() && !table.contains(other))

@@ -13,6 +13,8 @@ namespace nephele::apps {
 struct LayerRecipe {
   /// "--recipe: cloud.toml:7", for messages.
   std::string place;
+  /// All that it says, in one form: the same for tables that say the same.
+  std::string text;
   std::optional<NoiseKind> noise;
   std::optional<SpectrumOptions> spectrum;
   std::optional<float> time, period;

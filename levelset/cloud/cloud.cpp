@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nephele/levelset/cloud/kept_layers.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -84,24 +85,30 @@ RepairedMesh readShape(const std::string& path, const MeshRepairOptions& repair,
 
 namespace {
 
-GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
+GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Progress& progress,
+                       KeptLayers* kept = nullptr) {
   requireValid(mesh);
   require(options.voxelSize > 0,
           "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
   const std::vector<CumuloLayer>& layers = options.layers;
   const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);
-  const float reach = cumuloExteriorBand(layers, options.voxelSize, edge);
+  const float reach = cumuloExteriorBand(layers, options.voxelSize, edge, kept != nullptr);
   require(reach <= kFarthestVoxels * options.voxelSize,
           fmt::format("the layers move the surface by up to {:.3g}, which is {:.3g} voxels, allowed: up to "
                       "{:g}; use a smaller amplitude, a higher frequency or larger voxels",
                       reach, reach / options.voxelSize, kFarthestVoxels));
-  progress.begin("distance");
-  const ScalarField base = meshDistance(mesh,
-                                        {.voxelSize = baseVoxelSize(layers, options.voxelSize),
-                                         .exteriorBand = reach,
-                                         .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)},
-                                        progress);
+  const MeshDistanceOptions distance{.voxelSize = baseVoxelSize(layers, options.voxelSize),
+                                     .exteriorBand = reach,
+                                     .interiorBand = cumuloInteriorBand(layers, options.voxelSize, edge)};
+  const auto makeBase = [&] {
+    progress.begin("distance");
+    return meshDistance(mesh, distance, progress);
+  };
+  const ScalarField base = kept ? kept->distance(fmt::format("{} {} {}", distance.voxelSize,
+                                                             distance.exteriorBand, distance.interiorBand),
+                                                 makeBase)
+                                : makeBase();
   return griddedCumulo(base, layers,
                        {.voxelSize = options.voxelSize,
                         .box = boundingBox(mesh),
@@ -109,7 +116,8 @@ GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Prog
                         .edge = edge,
                         .closestPoint = closestPoint(mesh),
                         .medialSmoothing = options.medialSmoothing,
-                        .renormalise = options.renormalise},
+                        .renormalise = options.renormalise,
+                        .kept = kept},
                        progress);
 }
 
@@ -140,8 +148,9 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
   return cloud;
 }
 
-CloudLevels makeCloudLevels(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {
-  const GriddedCumulo cumulo = layersOn(mesh, options, progress);
+CloudLevels makeCloudLevels(const Mesh& mesh, const CloudOptions& options, const Progress& progress,
+                            KeptLayers* kept) {
+  const GriddedCumulo cumulo = layersOn(mesh, options, progress, kept);
   const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);
   return cloudLevels(cumulo, options.voxelSize, std::max(edge, kCloudSurfaceVoxels * options.voxelSize),
                      progress);

@@ -44,8 +44,9 @@ Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& p
 /// The same in two steps: `makeCloud(makeCloudLevels(mesh, options), other)` is `makeCloud(mesh, other)`, bit
 /// for bit, for other edges, exponents, factors and surfaces, as long as `cloudEdgeReach` of the edges is the
 /// same.
+/// `kept` lends what it has of the distance and the layers, and keeps them.
 CloudLevels makeCloudLevels(const Mesh& mesh, const CloudOptions& options,
-                            const Progress& progress = silent());
+                            const Progress& progress = silent(), KeptLayers* kept = nullptr);
 Cloud makeCloud(const CloudLevels& levels, const CloudOptions& options, const Progress& progress = silent());
 
 /// How far from the surface layers are made for an edge that is nowhere thicker than this: 2.25 voxels, or

@@ -11,6 +11,8 @@
 // Limits: base features thinner than two voxels of a layer's grid are not seen by the layers after it.
 #include "nephele/levelset/cloud/layers_on_grids.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -23,6 +25,7 @@
 
 #include "nephele/levelset/cloud/detail/layer_fields.h"
 #include "nephele/levelset/cloud/detail/layer_parts.h"
+#include "nephele/levelset/cloud/kept_layers.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/cloud/renormalise.h"
 #include "nephele/levelset/grid/bake.h"
@@ -92,9 +95,23 @@ class LayerSampler {
  public:
   LayerSampler(const std::vector<CumuloLayer>& layers, const CumuloGridOptions& options,
                const Progress& progress)
-      : layers_(layers), options_(options), progress_(progress), reach_(displacementBound(layers)) {}
+      : layers_(layers), options_(options), progress_(progress), reach_(reachOf(0)) {}
+
+  /// Of a layer and those after it.
+  float reachOf(std::size_t index) const {
+    return options_.kept ? KeptLayers::reach(layers_, index, options_.voxelSize)
+                         : displacementBound(layers_, index);
+  }
 
   CumuloSampled operator()(const CumuloStep& step) {
+    // The last layer is another one wherever anything is.
+    const bool isKept = options_.kept && step.index + 1 < layers_.size();
+    if (isKept)
+      if (const KeptLayers::Layer* kept = options_.kept->find(step, layers_, numbersOf(step))) {
+        level_ = kept->level;
+        reports.push_back(kept->report);
+        return kept->sampled;
+      }
     const auto start = std::chrono::steady_clock::now();
     progress_.begin("layer " + std::to_string(step.index + 1));
     const float voxel = cumuloVoxelSize(layers_, step.index, options_.voxelSize);
@@ -105,6 +122,7 @@ class LayerSampler {
     prepareNext(step, grid, sampled);
     reports.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     progress_.count("active_voxels", double(reports.back().activeVoxels));
+    if (isKept) options_.kept->keep({sampled, level_, reports.back()});
     return sampled;
   }
 
@@ -113,6 +131,15 @@ class LayerSampler {
   float estimateVoxelSize = 0;
 
  private:
+  /// All numbers that the result of a step depends on.
+  std::string numbersOf(const CumuloStep& step) const {
+    return fmt::format("{} {} {} {} {} {} {} {}", cumuloVoxelSize(layers_, step.index, options_.voxelSize),
+                       options_.voxelSize, step.bound, step.reach, step.margin,
+                       marginOf(layers_, step.index + 1, options_), options_.newtonSteps,
+                       options_.medialSmoothing) +
+           fmt::format(" {}", int(options_.renormalise));
+  }
+
   /// The layer's grid, packed. A large one is made in parts along z, since samples take more memory until
   /// they are packed. A part is smoothed together with as much of its neighbours as can reach it: the parts
   /// do not show.
@@ -336,8 +363,9 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
   return std::min(wave / kFewestSamplesPerWave, std::max(aimed, resultVoxelSize));
 }
 
-float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
-  return displacementBound(layers) + cumuloInteriorBand(layers, voxelSize, edge);
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge, bool areKept) {
+  return (areKept ? KeptLayers::reach(layers, 0, voxelSize) : displacementBound(layers)) +
+         cumuloInteriorBand(layers, voxelSize, edge);
 }
 
 float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
@@ -401,13 +429,14 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
   // The first layer's passes all read the base at the same voxels; each level of a distance takes its time.
   const float margin = marginOf(layers, 0, options);
   detail::BrickMemo memo(base, cumuloVoxelSize(layers, 0, options.voxelSize),
-                         options.box.expanded(displacementBound(layers) + margin), kWholePositions);
+                         options.box.expanded(sampler.reachOf(0) + margin), kWholePositions);
   form.bake = [&](const CumuloStep& step) {
     CumuloSampled sampled = sampler(step);
     memo.clear();
     return sampled;
   };
   form.margin = [&](std::size_t layer) { return marginOf(layers, layer, options); };
+  form.reach = [&](std::size_t layer) { return sampler.reachOf(layer); };
   GriddedCumulo result;
   result.surface = cumulo(memo.field(), layers, std::move(form));
   result.estimate = sampler.estimate;

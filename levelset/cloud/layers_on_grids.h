@@ -10,6 +10,8 @@
 
 namespace nephele {
 
+class KeptLayers;
+
 /// How `griddedCumulo` samples the layers.
 struct CumuloGridOptions {
   enum class Renormalise {
@@ -35,6 +37,8 @@ struct CumuloGridOptions {
   /// Turning l_i into a distance between layers changes the shape: later bumps then grow along the true
   /// normal.
   Renormalise renormalise = Renormalise::off;
+  /// Layers to begin with, and where those that are made stay; null: none.
+  KeptLayers* kept = nullptr;
 };
 
 /// What a layer came to.
@@ -73,7 +77,9 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
 
 /// Exterior band (world units) in which the base must be a distance for `layers`; the interior one is
 /// `cumuloInteriorBand`. They cover the displacement, the coarsest grid's interpolation and the Newton steps.
-float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f);
+/// With kept layers, which reach farther, they are wider.
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f,
+                         bool areKept = false);
 float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f);
 
 /// Memory of the grids of `griddedCumulo`, bytes.

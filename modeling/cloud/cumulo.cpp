@@ -191,7 +191,7 @@ ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& laye
     step.surface = surface;
     step.level = level;
     step.bound = detail::layerBound(layers, i);
-    step.reach = displacementBound(layers, i);
+    step.reach = options.reach ? options.reach(i) : displacementBound(layers, i);
     step.margin = options.margin ? options.margin(i) : 4 * options.voxelSize;
     step.displacement = ScalarField(std::make_shared<LayerNode>(step, before, options));
     options.closestPoint.reset();

@@ -61,6 +61,9 @@ struct CumuloOptions {
   std::optional<VectorField> closestPoint{};
   /// Margin of the band of a layer, by its index. Empty: 4 h. A bake at a coarser voxel size needs more.
   std::function<float(std::size_t layer)> margin{};
+  /// How far a layer and those after it can reach, by the index of the layer: at least displacementBound.
+  /// Empty: that.
+  std::function<float(std::size_t layer)> reach{};
 };
 
 /// `base` with all `layers` grown on it: l_M.

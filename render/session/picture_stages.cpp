@@ -25,6 +25,7 @@ std::shared_ptr<const Mesh> PictureStages::shape(const std::string& key, const s
 }
 
 std::shared_ptr<const CloudLevels> PictureStages::levels(const std::string& key, const CloudOptions& options,
+                                                         const std::vector<std::string>& layerKeys,
                                                          const Progress& progress) {
   require(shape_.kept() != nullptr, "PictureStages: levels need a shape");
   const std::string whole = joined(shape_.key(), key);
@@ -34,7 +35,9 @@ std::shared_ptr<const CloudLevels> PictureStages::levels(const std::string& key,
     volume_.forget();
   }
   return levels_.at(whole, [&] {
-    return std::make_shared<const CloudLevels>(makeCloudLevels(*shape_.kept(), options, progress));
+    layers_.expect({shape_.key(), layerKeys});
+    return std::make_shared<const CloudLevels>(
+        makeCloudLevels(*shape_.kept(), options, progress, layerKeys.empty() ? nullptr : &layers_));
   });
 }
 
@@ -86,6 +89,7 @@ void PictureStages::forget() {
   light_.forget();
   volume_.forget();
   levels_.forget();
+  layers_.forget();
   shape_.forget();
 }
 

@@ -3,8 +3,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "nephele/levelset/cloud/cloud.h"
+#include "nephele/levelset/cloud/kept_layers.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/march/raymarch.h"
@@ -28,18 +30,21 @@ struct LightSetup {
 
 /// The steps from a shape to a picture of the cloud on it, each kept until what it depends on changes:
 ///
-///     shape -> levels -> volume -> light -> picture
+///     shape -> distance -> layers, one by one -> levels -> volume -> light -> picture
 ///
 /// Moving the camera marches again, moving a sun makes its light again and keeps the sky's, another edge
-/// keeps the layers. Every step is asked for with a key that says what it depends on beside the step before
-/// it (see Stage); the steps are asked for in their order. A volume from elsewhere begins the chain.
-/// Cancelling leaves all steps that were finished. For one thread at a time.
+/// keeps the levels, another third layer keeps the first two. Every step is asked for with a key that says
+/// what it depends on beside the step before it (see Stage); the steps are asked for in their order. A volume
+/// from elsewhere begins the chain. Cancelling leaves all steps that were finished. For one thread at a time.
 class PictureStages {
  public:
   /// @param read makes the shape. @throws what it throws.
   std::shared_ptr<const Mesh> shape(const std::string& key, const std::function<Mesh()>& read);
   /// The layers of a cloud on the shape. @throws as makeCloudLevels.
+  /// `layerKeys` says what each layer depends on beside the shape and the layers before it, so that those
+  /// that have not changed are kept, see KeptLayers; without it all are made again.
   std::shared_ptr<const CloudLevels> levels(const std::string& key, const CloudOptions& options,
+                                            const std::vector<std::string>& layerKeys = {},
                                             const Progress& progress = silent());
   /// The volume that is looked at, made from the levels, if there are any, or of something else.
   std::shared_ptr<const RenderVolume> volume(const std::string& key,
@@ -59,6 +64,8 @@ class PictureStages {
   };
   /// Whether the light is there under these keys; a picture then only needs to be marched.
   bool isLit(const Keys& keys) const;
+  /// How many layers the levels took from those before.
+  std::size_t layersTaken() const { return layers_.taken(); }
   /// The light that is there, whatever it is of, or null.
   std::shared_ptr<const LitCloud> lit() const { return light_.kept(); }
   /// Lets everything go.
@@ -66,6 +73,7 @@ class PictureStages {
 
  private:
   Stage<Mesh> shape_;
+  KeptLayers layers_;
   Stage<CloudLevels> levels_;
   Stage<RenderVolume> volume_;
   Stage<LitCloud> light_;

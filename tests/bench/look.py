@@ -126,6 +126,7 @@ def main():
         shapes = [viewer.picture({"cloud": {"amplitude": f"{2 + i / 10}%"}}, hurry=True) for i in range(8)]
         print(f"amplitude drag           {1000 * statistics.median(shapes):7.1f} ms in the median")
         print(f"amplitude, at rest       {1000 * viewer.final({'cloud': {'amplitude': '3%'}}):7.1f} ms")
+        print(f"billow, at rest          {1000 * viewer.final({'cloud': {'amplitude': '3%', 'billow': '0.7'}}):7.1f} ms")
         print(f"edge, at rest            {1000 * viewer.final({'cloud': {'amplitude': '3%', 'edge-thickness': '0.5%'}}):7.1f} ms")
     before = viewer.processor()
     time.sleep(3)

@@ -2,6 +2,7 @@
 // call.
 #include "nephele/render/session/picture_stages.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -15,12 +16,13 @@ namespace {
 
 const Lights kLights{{{"sun", directionTowards(60, 30), {3, 3, 3}}}, {0.1f, 0.2f, 0.3f}};
 
-CloudOptions cloudOptions(float amplitude) {
+CloudOptions cloudOptions(float amplitude, int layers = 2, float roughness = 0.55f) {
   CloudOptions options;
   CumuloFractal form;
-  form.layers = 2;
+  form.layers = layers;
+  form.roughness = ScalarField(roughness);
   form.amplitude = ScalarField(amplitude);
-  form.frequency = ScalarField(4.0f);
+  form.frequency = ScalarField(8.0f / float(layers));
   options.layers = cumuloLayers(form);
   options.voxelSize = 1.0f / 24;
   options.edgeThickness = ScalarField(0.05f);
@@ -44,7 +46,7 @@ struct Steps {
     });
     CloudOptions options = cloudOptions(amplitude);
     options.edgeThickness = ScalarField(std::stof(edge));
-    const auto levels = stages.levels(std::to_string(amplitude), options, progress);
+    const auto levels = stages.levels(std::to_string(amplitude), options, {}, progress);
     const auto volume = stages.volume(edge, [&] {
       ++volumes;
       return RenderVolume(toBricks(makeCloud(*levels, options, progress).density));
@@ -56,6 +58,16 @@ struct Steps {
     return Camera::framing(volume.outline(), azimuth, 10, {24, 18});
   }
 };
+
+std::vector<float> samplesOf(const VoxelGrid<float>& grid) {
+  std::vector<float> samples;
+  grid.forEachBrick([&](const Vec3i& brick, std::int32_t entry) {
+    for (const int i : {brick.x, brick.y, brick.z}) samples.push_back(float(i));
+    if (entry < 0) return samples.push_back(grid.constants()[std::size_t(-1 - entry)]);
+    samples.insert(samples.end(), grid.samples(entry), grid.samples(entry) + kBrickSamples);
+  });
+  return samples;
+}
 
 void expectSame(const Image& a, const Image& b) {
   ASSERT_EQ(a.channels.size(), b.channels.size());
@@ -147,6 +159,39 @@ TEST(PictureStages, GoOnAfterTheyWereCancelled) {
   EXPECT_GT(cancels, 1);
   expectSame(steps.picture()->image, whole->image);
   EXPECT_EQ(steps.shapes, 1);
+}
+
+// What the stages come to does not depend on what they have kept, and of layers they keep the first ones.
+TEST(PictureStages, KeepLayersBeforeThatWhichChanges) {
+  PictureStages stages;
+  const auto levels = [](PictureStages& of, float amplitude, float last, float roughness = 0.55f) {
+    of.shape("humilis", [] { return cloudShapeMesh({}); });
+    CloudOptions options = cloudOptions(amplitude, 3, roughness);
+    options.layers[2].amplitude = ScalarField(last);
+    const std::string own = fmt::format("{} {}", amplitude, roughness);
+    const std::vector<std::string> layers{fmt::format("{}", amplitude), own, own + fmt::format(" {}", last)};
+    return of.levels(layers.back(), options, layers);
+  };
+  const auto expectAsFresh = [&](const CloudLevels& found, float amplitude, float last, float roughness) {
+    PictureStages fresh;
+    const auto wanted = levels(fresh, amplitude, last, roughness);
+    EXPECT_EQ(fresh.layersTaken(), 0u);
+    EXPECT_EQ(samplesOf(found.levels), samplesOf(wanted->levels));
+    EXPECT_EQ(found.layers.size(), 3u);
+  };
+  levels(stages, 0.03f, 0.0085f);
+  EXPECT_EQ(stages.layersTaken(), 0u);
+  const auto higher = levels(stages, 0.03f, 0.009f);
+  EXPECT_EQ(stages.layersTaken(), 2u);
+  expectAsFresh(*higher, 0.03f, 0.009f, 0.55f);
+  const auto second = levels(stages, 0.03f, 0.009f, 0.54f);
+  EXPECT_EQ(stages.layersTaken(), 1u);
+  expectAsFresh(*second, 0.03f, 0.009f, 0.54f);
+  levels(stages, 0.031f, 0.009f, 0.54f);
+  EXPECT_EQ(stages.layersTaken(), 0u);
+  stages.forget();
+  levels(stages, 0.031f, 0.009f, 0.54f);
+  EXPECT_EQ(stages.layersTaken(), 0u);
 }
 
 TEST(PictureStages, RefuseStepsWithoutTheOnesBefore) {
