@@ -9,6 +9,7 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
@@ -37,7 +38,38 @@ std::vector<CutPart> readInput(const CutArguments& a, Run& run) {
   return parts;
 }
 
+/// Planes through a convex model part it into at most 1 + n + n over 2 + n over 3 pieces; random ones make
+/// two thirds of these.
+void requirePiecesMemory(const Knives& knives, std::size_t parts, const Run& run) {
+  constexpr double kBytesPerPiece = 7000, kMany = 2e4;
+  const auto n = double(knives.planes.size() + knives.rough.size());
+  const double most =
+      n + n * (n - 1) / 2 + n * (n - 1) * (n - 2) / 6 + double(knives.cells.size()) + double(parts);
+  run.requireMemory(kBytesPerPiece * most, fmt::format("use fewer knives than {:g}", n));
+  if (most > kMany) run.note(fmt::format("{:g} knives: this may make up to {:.2g} pieces", n, most));
+}
+
 }  // namespace
+
+void addLevelSets(std::vector<CutPart>& parts, double voxelSize, Run& run) {
+  for (CutPart& part : parts) {
+    const MeshToLevelSetOptions options{.voxelSize = voxelSize};
+    if (!part.level) part.mesh = triangulated(part.mesh);
+    run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
+                      "use larger voxels (a lower --resolution or a larger --voxel-size)");
+    if (!part.level)
+      part.level = namingFile(part.name, [&] { return toBricks(meshToLevelSet(part.mesh, options, run)); });
+  }
+}
+
+Pieces CutArguments::cut(const std::vector<CutPart>& parts, const CutKnives& knives, Run& run) const {
+  requirePiecesMemory(knives.knives, parts.size(), run);
+  return namingFile(input, [&] {
+    return geometry == Geometry::exact
+               ? cutIntoMeshes(parts, knives.knives, knives.options, run)
+               : cutIntoLevelSets(parts, knives.voxelSize, knives.knives, knives.options, run);
+  });
+}
 
 std::vector<CutPart> CutArguments::readParts(Run& run) const {
   run.begin("read");

@@ -98,10 +98,12 @@ fi
 
 if picture looks; then
   files=
-  for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion; do
-    grow "look_$look.vdb" cloud --look "$look" --resolution 224
+  for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion wisps; do
+    verb=cloud
+    [ $look != wisps ] || verb=wisps
+    grow "look_$look.vdb" $verb --look "$look" --resolution 224
     show "look_$look" "look_$look.vdb" --look "$look" --size 480x270
-    files="$files look_$look.png"
+    [ $look = wisps ] || files="$files look_$look.png"
     # The viewer shows them, too.
     oiiotool "look_$look.png" --resize 240x135 --quality 82 -o "$docs/../apps/look/page/look/$look.jpg"
   done

@@ -22,9 +22,18 @@ namespace {
 
 /// A verb with its options, to be looked at.
 struct Table {
-  explicit Table(const std::string& name)
-      : verb(name == "cloud" ? lookCloudVerb(cloud) : lookRenderVerb(scene, picture)), command(verb) {}
+  explicit Table(const std::string& name) : verb(named(name)), command(verb) {}
+  Verb named(const std::string& name) {
+    if (name == "cloud") return lookCloudVerb(cloud);
+    if (name == "wisps") return lookWispsVerb(wisps);
+    if (name == "cut") return lookCutVerb(cut);
+    if (name == "transfer") return lookTransferVerb(transfer);
+    return lookRenderVerb(scene, picture);
+  }
   CloudArguments cloud;
+  WispsArguments wisps;
+  CutArguments cut;
+  TransferArguments transfer;
   SceneOptions scene;
   PictureOptions picture;
   Verb verb;
@@ -36,6 +45,8 @@ struct Slider {
   std::string_view name, unit;
   double low, high, step;
   bool isLogarithmic = false;
+  /// Of one verb alone; others have the slider of the name that has none.
+  std::string_view verb{};
 };
 constexpr std::array kSliders{Slider{"resolution", "", 32, 1024, 1, true},
                               Slider{"layers", "", 1, 8, 1},
@@ -65,7 +76,55 @@ constexpr std::array kSliders{Slider{"resolution", "", 32, 1024, 1, true},
                               Slider{"sky-rotation", "°", -180, 180, 1},
                               Slider{"emission-scale", "", 0, 4, 0.01},
                               Slider{"temperature-scale", "K", 500, 6000, 10},
-                              Slider{"density-scale", "", 0, 4, 0.01}};
+                              Slider{"density-scale", "", 0, 4, 0.01},
+                              Slider{"amplitude", "", 0, 5, 0.01, false, "wisps"},
+                              Slider{"frequency", "", 0.1, 10, 0.01, true, "wisps"},
+                              Slider{"density", "", 0, 20, 0.05, false, "wisps"},
+                              Slider{"guides", "", 1, 1000, 1, true},
+                              Slider{"wisp-size", "%", 0.5, 100, 0.1, true},
+                              Slider{"wisp-size-variation", "", 0, 0.99, 0.01},
+                              Slider{"dots", "", 1000, 4000000, 1, true},
+                              Slider{"correlation", "", 0, 1, 0.01},
+                              Slider{"thickness", "", 0, 1, 0.01},
+                              Slider{"clump", "", 0, 3, 0.01},
+                              Slider{"displacement", "", 0, 3, 0.01},
+                              Slider{"displacement-frequency", "", 0.1, 10, 0.01, true},
+                              Slider{"random-planes", "", 1, 40, 1},
+                              Slider{"voronoi", "", 1, 200, 1, true},
+                              Slider{"roughness", "%", 0, 4, 0.01, false, "cut"},
+                              Slider{"roughness-frequency", "x", 1, 40, 0.1, true},
+                              Slider{"roughness-octaves", "", 1, 12, 1},
+                              Slider{"kerf", "%", 0, 5, 0.01},
+                              Slider{"min-volume", "%", 0, 5, 0.01},
+                              Slider{"explode", "", 0, 2, 0.01},
+                              Slider{"checker", "", 1, 100, 1, true, "transfer"},
+                              Slider{"iterations", "", 1, 20, 1},
+                              Slider{"subdivide", "", 0, 4, 1, false, "transfer"}};
+
+// Of `render`, those that the pictures of surfaces have, too: the camera, and the way to the screen.
+const std::set<std::string> kOfAllViews{"view",
+                                        "camera-position",
+                                        "look-at",
+                                        "up",
+                                        "fov",
+                                        "focal-length",
+                                        "film-width",
+                                        "projection",
+                                        "orthographic-width",
+                                        "exposure",
+                                        "view-transform",
+                                        "ocio-config"};
+
+/// What may be shown for an option to say something about it.
+std::vector<std::string> viewsOf(const std::string& verb, const std::string& option) {
+  if (verb == "cloud") return {"cloud", "surface", "checker"};
+  if (verb == "wisps") return {"wisps"};
+  if (verb == "cut") return {"pieces"};
+  if (verb == "transfer") return {"transfer"};
+  std::vector<std::string> views{"cloud", "surface", "wisps"};
+  if (kOfAllViews.contains(option)) views.insert(views.end(), {"checker", "pieces", "transfer"});
+  return views;
+}
 
 // What the viewer does in other ways, or not at all.
 const std::set<std::string> kNotShown{"size",          "crop",
@@ -107,9 +166,14 @@ nlohmann::json controlOf(const OptionRow& option, const std::string& verb, bool 
                             {"type", typeOf(option)},  {"is_field", isField(option)},
                             {"form", option.type},     {"repeats", option.repeats},
                             {"first_day", isFirstDay}, {"excludes", option.excludes},
-                            {"needs", option.needs}};
+                            {"needs", option.needs},   {"views", viewsOf(verb, option.name)}};
   if (const auto choices = option.choices(); !choices.empty()) control["choices"] = choices;
-  const auto slider = std::ranges::find(kSliders, std::string_view(option.name), &Slider::name);
+  const auto sliderOf = [&](std::string_view itsVerb) {
+    return std::ranges::find_if(
+        kSliders, [&](const Slider& one) { return one.name == option.name && one.verb == itsVerb; });
+  };
+  const auto* slider = sliderOf(verb);
+  if (slider == kSliders.end()) slider = sliderOf("");
   if (slider != kSliders.end())
     control.update({{"unit", slider->unit},
                     {"low", slider->low},
@@ -125,8 +189,21 @@ bool isShown(const OptionRow& option, const std::string& verb) {
          option.group != kSeveralGroup && !kNotShown.contains(option.name) && !isOfCloudsToo;
 }
 
+/// Adds controls to the group of this name, which may be there for another verb already.
+void addTo(nlohmann::json& groups, const std::string& name, const nlohmann::json& controls) {
+  if (controls.empty()) return;
+  for (nlohmann::json& group : groups)
+    if (group["name"] == name) {
+      group["controls"].insert(group["controls"].end(), controls.begin(), controls.end());
+      return;
+    }
+  groups.push_back({{"name", name}, {"controls", controls}});
+}
+
 /// Those of the first day in their groups, then the others.
-void addGroups(const Verb& verb, nlohmann::json& groups) {
+void addGroups(const std::string& verbName, nlohmann::json& groups) {
+  const Table table(verbName);
+  const Verb& verb = table.verb;
   std::vector<OptionRow> rows = optionTable(verb);
   std::erase_if(rows, [&](const OptionRow& row) { return !isShown(row, verb.name); });
   for (const FirstDay& day : firstDays()) {
@@ -138,12 +215,16 @@ void addGroups(const Verb& verb, nlohmann::json& groups) {
       controls.push_back(controlOf(*row, verb.name, true));
       rows.erase(row);
     }
-    groups.push_back({{"name", day.group}, {"verb", verb.name}, {"controls", controls}});
+    addTo(groups, std::string(day.group), controls);
   }
   auto rest = nlohmann::json::array();
   for (const OptionRow& row : rows) rest.push_back(controlOf(row, verb.name, false));
-  const std::string name = verb.name == "cloud" ? "More of the cloud" : "More of the picture";
-  groups.push_back({{"name", name}, {"verb", verb.name}, {"controls", rest}});
+  static const std::map<std::string, std::string> names{{"cloud", "cloud"},
+                                                        {"wisps", "wisps"},
+                                                        {"cut", "cut"},
+                                                        {"transfer", "transfer"},
+                                                        {"render", "picture"}};
+  addTo(groups, "More of the " + names.at(verb.name), rest);
 }
 
 std::vector<std::string> verbNames() {
@@ -154,10 +235,17 @@ std::vector<std::string> verbNames() {
 
 }  // namespace
 
+bool isLookOfWisps(const std::string& name) {
+  return lookText(name).find("\n[wisps]") != std::string::npos;
+}
+
 nlohmann::json lookControls(const LookSubject& subject) {
   auto groups = nlohmann::json::array();
-  if (subject.hasCloud()) addGroups(cloudVerb(), groups);
-  addGroups(renderVerb(), groups);
+  std::string last;
+  for (const LookShow::What what : subject.views())
+    if (const std::string verb = LookShow::verb(what); subject.hasCloud() && verb != last)
+      addGroups(last = verb, groups);
+  addGroups("render", groups);
   // What is needed first comes first, of both.
   std::stable_sort(groups.begin(), groups.end(), [](const nlohmann::json& a, const nlohmann::json& b) {
     const auto isMore = [](const nlohmann::json& group) {
@@ -191,23 +279,20 @@ nlohmann::json lookParameters(const LookSubject& subject) {
   return parameters;
 }
 
-nlohmann::json settingsOfLine(const LookSubject& subject, const std::vector<std::string>& arguments,
-                              std::vector<std::string>& others) {
+nlohmann::json settingsOfLine(const LookSubject& subject, LookShow::What what,
+                              const std::vector<std::string>& arguments, std::vector<std::string>& others) {
   const std::vector<std::string> names = verbNames();
-  nlohmann::json settings = {{"cloud", nlohmann::json::object()},
-                             {"render", nlohmann::json::object()},
-                             {"parameters", nlohmann::json::object()}};
-  const auto read = [&](const char* name, const std::vector<std::string>& given,
+  LookSettings settings = emptySettings();
+  const auto read = [&](const std::string& verb, const std::vector<std::string>& given,
                         std::vector<std::string>& left) {
-    Table table(name);
-    const std::string verb = name;
+    Table table(verb);
     std::vector<std::string> all = given;
     // So that looks leave out what belongs to another shape.
-    if (verb == "cloud" && !subject.path.empty()) all.push_back(subject.path);
+    if (verb != "render" && verb != "transfer" && !subject.path.empty()) all.push_back(subject.path);
     all = withConfigFile({table.command.app, verb, names},
                          withCurrentNames(verb, std::move(all), [](const std::string&) {}));
-    settings[name] = settingsOf(table.command.app, all, left);
-    for (const char* file : {"config", "look"}) settings[name].erase(file);
+    settings[verb] = settingsOf(table.command.app, all, left);
+    for (const char* file : {"config", "look"}) settings[verb].erase(file);
     if (!subject.path.empty()) std::erase(left, subject.path);
   };
   std::vector<std::string> ofFiles, left;
@@ -225,7 +310,7 @@ nlohmann::json settingsOfLine(const LookSubject& subject, const std::vector<std:
     ofRender.clear();
     std::vector<std::string> typed = left;
     typed.insert(typed.end(), ofFiles.begin(), ofFiles.end());
-    read("cloud", typed, ofRender);
+    read(LookShow::verb(what), typed, ofRender);
   }
   ofRender.insert(ofRender.end(), ofFiles.begin(), ofFiles.end());
   read("render", ofRender, others);
@@ -246,9 +331,14 @@ nlohmann::json settingsOfLine(const LookSubject& subject, const std::vector<std:
 nlohmann::json shippedLooks(const LookSubject& subject) {
   auto looks = nlohmann::json::array();
   for (const std::string& name : lookNames()) {
+    // Whatever else there is to see, a look is of a cloud or of wisps.
+    const LookShow::What what =
+        isLookOfWisps(name) && subject.hasCloud() ? LookShow::What::wisps : LookShow::What::cloud;
     std::vector<std::string> others;
     try {
-      looks.push_back({{"name", name}, {"settings", settingsOfLine(subject, {"--look", name}, others)}});
+      looks.push_back({{"name", name},
+                       {"show", LookShow::word(what)},
+                       {"settings", settingsOfLine(subject, what, {"--look", name}, others)}});
     } catch (const CLI::Error&) {
       // Of another verb.
     }

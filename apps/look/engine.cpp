@@ -14,10 +14,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double secondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 nlohmann::json jsonOf(const Vec3d& v) {
   return {v.x, v.y, v.z};
 }
@@ -26,7 +22,7 @@ nlohmann::json jsonOf(const Vec3d& v) {
 constexpr double kDragSeconds = 0.035, kSoonSeconds = 0.12;
 
 /// What a page learns of a picture, whatever it was asked for.
-nlohmann::json describedPicture(const LookTier::Picture& picture) {
+nlohmann::json describedPicture(const LookPicture& picture) {
   const Camera& camera = picture.camera;
   const Vec3d middle(picture.bounds.isEmpty() ? Vec3f{} : picture.bounds.center());
   const double away = dot(middle - camera.position(), camera.forward());
@@ -245,12 +241,17 @@ void LookEngine::sendFault(const std::string& page, std::int64_t revision, const
   tell(page, message);
 }
 
-void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const LookTier::Frame& frame,
-                      int level, bool isFinal, Work& work) {
+LookPicture LookEngine::picture(LookTier& tier, const LookPlan& plan, const LookFrame& frame, Run& run) {
+  const std::string verb = LookShow::verb(plan.what);
+  if (verb == "cut" || verb == "transfer") return shapes_.picture(plan, frame, run);
+  return tier.picture(plan, frame, &tier == &fine_ ? nullptr : &fine_, run);
+}
+
+void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const LookFrame& frame, int level,
+                      bool isFinal, Work& work) {
   LookTier& own = tier == LookPlan::Tier::coarse ? coarse_ : fine_;
   const auto start = Clock::now();
-  const LookTier::Picture picture =
-      own.picture(*request.plan, frame, tier == LookPlan::Tier::coarse ? &fine_ : nullptr, work);
+  const LookPicture picture = this->picture(own, *request.plan, frame, work);
   std::string bytes = shownJpeg(*picture.image, request.show, picture.options.screen, isFinal ? 92 : 80);
   nlohmann::json message = describedPicture(picture);
   message.update({{"type", "picture"},
@@ -260,6 +261,7 @@ void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const Loo
                   {"width", frame.width},
                   {"height", frame.height},
                   {"mime", "image/jpeg"},
+                  {"turns", request.show.what == LookShow::What::transfer},
                   {"milliseconds", 1000 * secondsSince(start)},
                   {"seconds", work.seconds()},
                   {"stage", isFinal                          ? "final"
@@ -276,12 +278,12 @@ void LookEngine::make(const LookRequest& request) {
   using Tier = LookPlan::Tier;
   Work work(*this, request.page, request.revision);
   const auto sized = [&](double share, int samples) {
-    return LookTier::Frame{std::max(int(std::lround(request.width * share)), 16),
-                           std::max(int(std::lround(request.height * share)), 9), samples, request.show};
+    return LookFrame{std::max(int(std::lround(request.width * share)), 16),
+                     std::max(int(std::lround(request.height * share)), 9), samples, request.show};
   };
   try {
     const double pixels = double(request.width) * request.height;
-    const bool isCloud = request.show.what == LookShow::What::cloud;
+    const bool isCloud = request.show.isVolume();
     const bool isLit = isCloud && fine_.isLit(*request.plan);
     const Tier first = isLit ? Tier::fine : Tier::coarse;
     const LookTier& own = isLit ? fine_ : coarse_;
@@ -323,9 +325,9 @@ void LookEngine::make(LookWedge& wedge) {
                               {"mime", "image/jpeg"}};
     std::string bytes;
     try {
-      const LookTier::Picture picture =
-          small_.picture(*wedge.cells[i].plan, {wedge.width, wedge.height, 2, wedge.show}, &fine_, work);
-      bytes = shownJpeg(*picture.image, wedge.show, picture.options.screen, 88);
+      const LookPicture made =
+          picture(small_, *wedge.cells[i].plan, {wedge.width, wedge.height, 2, wedge.show}, work);
+      bytes = shownJpeg(*made.image, wedge.show, made.options.screen, 88);
     } catch (const Cancelled&) {
       const std::lock_guard lock(mutex_);
       // It goes on after what was asked for meanwhile, unless its page is gone or has asked for another.

@@ -12,6 +12,7 @@
 
 #include "apps/look/page.h"
 #include "apps/look/requests.h"
+#include "apps/look/shapes.h"
 #include "apps/look/tier.h"
 
 namespace nephele::apps {
@@ -52,8 +53,9 @@ class LookEngine {
   void run();
   void make(const LookRequest& request);
   void make(LookWedge& wedge);
-  void show(const LookRequest& request, LookPlan::Tier tier, const LookTier::Frame& frame, int level,
-            bool isFinal, Work& work);
+  void show(const LookRequest& request, LookPlan::Tier tier, const LookFrame& frame, int level, bool isFinal,
+            Work& work);
+  LookPicture picture(LookTier& tier, const LookPlan& plan, const LookFrame& frame, Run& run);
   void sendFault(const std::string& page, std::int64_t revision, const std::exception& error);
 
   const double memoryLimitBytes_;
@@ -70,6 +72,7 @@ class LookEngine {
   std::atomic<bool> isOutdated_{false}, yields_{false};
   // Of the worker alone.
   LookTier coarse_{LookPlan::Tier::coarse}, fine_{LookPlan::Tier::fine}, small_{LookPlan::Tier::coarse};
+  LookShapes shapes_;
   std::thread worker_;
 };
 

@@ -53,17 +53,40 @@ std::filesystem::path folderOfLooks() {
 
 }  // namespace
 
-std::vector<std::string> LookExports::cloudLine(const std::string& output) const {
-  std::vector<std::string> line{"cloud"};
-  LookSettings::value_type own = settings["cloud"];
-  if (subject.path.empty()) {
-    if (!own.contains("species")) own["species"] = "mediocris";
-  } else {
+std::vector<std::string> LookExports::volumeLine(const std::string& output) const {
+  const std::string verb = what == LookShow::What::wisps ? "wisps" : "cloud";
+  std::vector<std::string> line{verb};
+  LookSettings::value_type own = settings[verb];
+  if (!subject.path.empty())
     line.push_back(subject.path);
-  }
+  else if (verb == "cloud" && !own.contains("species"))
+    own["species"] = "mediocris";
   line.push_back("-o");
   line.push_back(output);
   for (std::string& argument : argumentsOf(own)) line.push_back(std::move(argument));
+  return line;
+}
+
+std::vector<std::string> LookExports::shapesLine() const {
+  const std::string verb = LookShow::verb(what);
+  std::vector<std::string> line{verb};
+  if (what == LookShow::What::transfer)
+    line.insert(line.end(), {"--from", subject.reference, "--to", subject.path});
+  else
+    line.push_back(subject.path);
+  nlohmann::json own = settings[verb];
+  // What only a picture has to do with.
+  for (const char* name : {"checker", "preview-paint"}) own.erase(name);
+  for (std::string& argument : argumentsOf(own)) line.push_back(std::move(argument));
+  return line;
+}
+
+std::vector<std::string> LookExports::previewLine(const std::string& preview) const {
+  std::vector<std::string> line{"--preview", preview, fmt::format("--size={}x{}", width, height)};
+  const nlohmann::json &own = settings[LookShow::verb(what)], &render = settings["render"];
+  for (const char* name : {"checker", "preview-paint"})
+    if (own.contains(name)) line.push_back(fmt::format("--{}={}", name, own[name].get<std::string>()));
+  if (render.contains("view")) line.push_back("--view=" + render["view"].get<std::string>());
   return line;
 }
 
@@ -80,7 +103,14 @@ std::vector<std::string> LookExports::pictureLine(const std::string& verb, const
 
 std::vector<std::string> LookExports::typed() const {
   std::vector<std::string> lines;
-  if (subject.hasCloud()) lines.push_back("nephele " + typedLine(cloudLine("cloud.vdb")));
+  if (what == LookShow::What::pieces || what == LookShow::What::transfer) {
+    std::vector<std::string> line = shapesLine();
+    line.insert(line.end(), {"-o", what == LookShow::What::pieces ? "pieces" : "object_uv.obj"});
+    for (std::string& argument : previewLine(LookShow::word(what) + ".png"))
+      line.push_back(std::move(argument));
+    return {"nephele " + typedLine(line)};
+  }
+  if (subject.hasCloud()) lines.push_back("nephele " + typedLine(volumeLine("cloud.vdb")));
   std::vector<std::string> picture = pictureLine("render", "cloud.vdb");
   picture.insert(picture.end(), {"-o", "cloud.exr", "--preview", "cloud.png"});
   lines.push_back("nephele " + typedLine(picture));
@@ -89,7 +119,8 @@ std::vector<std::string> LookExports::typed() const {
 
 std::string LookExports::recipe() const {
   std::string text;
-  if (subject.hasCloud()) addTable(text, "cloud", settings["cloud"]);
+  if (subject.hasCloud())
+    for (const char* verb : {"cloud", "wisps", "cut", "transfer"}) addTable(text, verb, settings[verb]);
   auto render = settings["render"];
   for (const auto& [name, value] : settings["parameters"].items())
     render["set"].push_back(name + "=" + (value.is_string() ? value.get<std::string>() : value.dump()));
@@ -160,8 +191,9 @@ std::string plainFileName(const std::string& name, const std::vector<std::string
     return name.ends_with(extension) && name.size() > extension.size();
   });
   if (!isPlain || !fits)
-    throw LookFault("", fmt::format("file: got '{}', allowed: a name without folders that ends with {}", name,
-                                    fmt::join(extensions, " or ")));
+    throw LookFault(
+        "", fmt::format("file: got '{}', allowed: a name without folders{}{}", name,
+                        extensions.front().empty() ? "" : " that ends with ", fmt::join(extensions, " or ")));
   return name;
 }
 

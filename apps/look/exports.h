@@ -12,10 +12,14 @@ namespace nephele::apps {
 struct LookExports {
   LookSubject subject;
   LookSettings settings;
+  LookShow::What what = LookShow::What::cloud;
   int width = 1280, height = 720;
 
-  /// Arguments of `nephele cloud`, for a cloud that is grown. `output`: its volume.
-  std::vector<std::string> cloudLine(const std::string& output) const;
+  /// Arguments of `nephele cloud` or `nephele wisps`, for what is grown. `output`: its volume.
+  std::vector<std::string> volumeLine(const std::string& output) const;
+  /// Arguments of `nephele cut` or `nephele transfer`, without outputs, and of the preview of its picture.
+  std::vector<std::string> shapesLine() const;
+  std::vector<std::string> previewLine(const std::string& preview) const;
   /// Arguments of `nephele VERB` (render or turntable) without outputs; `volume`: where the cloud was
   /// written.
   std::vector<std::string> pictureLine(const std::string& verb, const std::string& volume) const;

@@ -8,9 +8,10 @@
 namespace nephele::apps {
 
 /// What the command line of the viewer says beside the viewer's own options: what is looked at, and options
-/// of the verbs cloud and render.
+/// of the verb of what is shown and of render.
 struct LookLine {
   LookSubject subject;
+  LookShow::What what;
   LookSettings settings;
 
   /// From what `app` has left over. @throws CLI::ParseError, Error naming the file.

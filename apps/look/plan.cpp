@@ -40,15 +40,6 @@ bool isIn(std::span<const std::string_view> names, const std::string& name) {
   return std::ranges::count(names, name) > 0;
 }
 
-/// Those settings of a verb that `counts` is true of, as a key.
-template <class Counts>
-std::string keyOf(const nlohmann::json& settings, const Counts& counts) {
-  std::string key;
-  for (const auto& [name, value] : settings.items())
-    if (counts(name)) key += name + "=" + value.dump() + ";";
-  return key;
-}
-
 /// Pages may set how things look, and nothing else: no file is written but by an export, under a plain name.
 void refuseOthers(const Command& command) {
   for (const CLI::Option* option : command.app.get_options()) {
@@ -61,7 +52,50 @@ void refuseOthers(const Command& command) {
   }
 }
 
+/// Voxels that make a quick picture.
+template <class Arguments>
+void makeCoarse(Arguments& arguments) {
+  if (arguments.voxelSize.value > 0 && arguments.voxelSize.relative)
+    arguments.voxelSize.value = std::max(arguments.voxelSize.value, 100.0 / LookPlan::kCoarseVoxels);
+  else if (arguments.voxelSize.value <= 0)
+    arguments.resolution = std::min(arguments.resolution, LookPlan::kCoarseVoxels);
+}
+
+/// Without options that say what is written, and how a picture for a file is seen.
+void takeAway(CLI::App& app, const std::vector<std::string>& names) {
+  for (const std::string& name : names) app.remove_option(app.get_option(name));
+  // Nothing is written, so that no output is missing.
+  app.callback({});
+}
+
 }  // namespace
+
+Verb lookWispsVerb(WispsArguments& wisps) {
+  return {"wisps", "", "", [&wisps](CLI::App& app) {
+            addWispsOptions(app, wisps);
+            takeAway(app, {"--output", "--points", "--half"});
+            return BoundVerb{};
+          }};
+}
+
+Verb lookCutVerb(CutArguments& cut) {
+  return {"cut", "", "", [&cut](CLI::App& app) {
+            addCutOptions(app, cut);
+            takeAway(app, {"--output", "--vdb", "--format", "--preview", "--size", "--view"});
+            app.get_option("--explode")->default_str(fmt::format("{:g}", cut.picture.explode));
+            return BoundVerb{};
+          }};
+}
+
+Verb lookTransferVerb(TransferArguments& transfer) {
+  return {"transfer", "", "", [&transfer](CLI::App& app) {
+            addTransferOptions(app, transfer);
+            takeAway(app,
+                     {"--output", "--warp", "--warped-mesh", "--attributes", "--resolution", "--bake-texture",
+                      "--bake-size", "--bake-samples", "--gutter", "--preview", "--size", "--view"});
+            return BoundVerb{};
+          }};
+}
 
 Verb lookCloudVerb(CloudArguments& cloud) {
   return {"cloud", "", "", [&cloud](CLI::App& app) {
@@ -95,15 +129,32 @@ std::unique_ptr<LookPlan::Parsed> LookPlan::parsed(Verb verb, const nlohmann::js
   }
 }
 
-LookPlan::LookPlan(const LookSubject& itsSubject, const LookSettings& itsSettings)
-    : subject(itsSubject), settings(itsSettings) {
+LookPlan::LookPlan(const LookSubject& itsSubject, const LookSettings& itsSettings, LookShow::What its)
+    : subject(itsSubject), settings(itsSettings), what(its) {
+  const std::vector<LookShow::What> views = subject.views();
+  if (std::ranges::count(views, what) == 0) {
+    std::vector<std::string> words;
+    for (const LookShow::What view : views) words.push_back(LookShow::word(view));
+    throw LookFault("", fmt::format("--show: got '{}', allowed for this input: {}", LookShow::word(what),
+                                    fmt::join(words, ", ")));
+  }
   if (subject.hasCloud()) {
-    nlohmann::json own = settings["cloud"];
-    // What nobody has given grows on a shape of its own.
-    if (subject.path.empty() && !own.contains("species")) own["species"] = "mediocris";
-    cloudCommand_ =
-        parsed(lookCloudVerb(cloud), own,
-               subject.path.empty() ? std::vector<std::string>{} : std::vector<std::string>{subject.path});
+    const std::string verb = LookShow::verb(what);
+    nlohmann::json own = settings[verb];
+    std::vector<std::string> input;
+    if (!subject.path.empty()) input.push_back(subject.path);
+    if (verb == "cloud") {
+      // What nobody has given grows on a shape of its own.
+      if (subject.path.empty() && !own.contains("species")) own["species"] = "mediocris";
+      shownCommand_ = parsed(lookCloudVerb(cloud), own, input);
+    } else if (verb == "wisps") {
+      shownCommand_ = parsed(lookWispsVerb(wisps), own, input);
+    } else if (verb == "cut") {
+      shownCommand_ = parsed(lookCutVerb(cut), own, input);
+    } else {
+      shownCommand_ =
+          parsed(lookTransferVerb(transfer), own, {"--from", subject.reference, "--to", subject.path});
+    }
   }
   nlohmann::json own = settings["render"];
   for (const auto& [name, value] : settings["parameters"].items())
@@ -122,11 +173,15 @@ LookPlan::LookPlan(const LookSubject& itsSubject, const LookSettings& itsSetting
 
 CloudArguments LookPlan::cloudOf(Tier tier) const {
   CloudArguments result = cloud;
+  if (tier == Tier::coarse) makeCoarse(result);
+  return result;
+}
+
+WispsArguments LookPlan::wispsOf(Tier tier) const {
+  WispsArguments result = wisps;
   if (tier == Tier::fine) return result;
-  if (result.voxelSize.value > 0 && result.voxelSize.relative)
-    result.voxelSize.value = std::max(result.voxelSize.value, 100.0 / kCoarseVoxels);
-  else if (result.voxelSize.value <= 0)
-    result.resolution = std::min(result.resolution, kCoarseVoxels);
+  makeCoarse(result);
+  result.dots = std::min(result.dots, kCoarseDots);
   return result;
 }
 
@@ -142,7 +197,9 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
   const nlohmann::json &ofCloud = settings["cloud"], &ofRender = settings["render"];
   const std::string level = tier == Tier::coarse ? "coarse;" : "fine;";
   PictureStages::Keys keys;
-  if (subject.hasCloud()) {
+  if (what == LookShow::What::wisps) {
+    keys.volume = subject.stamp() + keyOf(settings["wisps"], [](const std::string&) { return true; });
+  } else if (subject.hasCloud()) {
     keys.shape =
         subject.stamp() + keyOf(ofCloud, [](const std::string& name) { return isIn(kOfShape, name); });
     std::string files;
@@ -154,8 +211,9 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
   } else {
     keys.volume = subject.stamp();
   }
-  keys.volume += level + keyOf(ofCloud, [](const std::string& name) { return isIn(kOfDensity, name); }) +
-                 settings["parameters"].dump() + keyOf(ofRender, [](const std::string& name) {
+  if (growsCloud())
+    keys.volume += keyOf(ofCloud, [](const std::string& name) { return isIn(kOfDensity, name); });
+  keys.volume += level + settings["parameters"].dump() + keyOf(ofRender, [](const std::string& name) {
                    return !isIn(kOfLights, name) && !isIn(kOfMedium, name) && !isIn(screenOptions(), name) &&
                           !isIn(cameraOptions(), name);
                  });

@@ -22,12 +22,9 @@ LookShow showOf(const nlohmann::json& body) {
   const auto& given = body["show"];
   if (!given.is_object()) throw LookFault("", "show: must be an object");
   const std::string what = given.value("what", "cloud");
-  if (what == "surface")
-    show.what = LookShow::What::surface;
-  else if (what == "checker")
-    show.what = LookShow::What::checker;
-  else if (what != "cloud")
-    throw LookFault("", "show: got '" + what + "', allowed: cloud, surface, checker");
+  const auto named = LookShow::named(what);
+  if (!named) throw LookFault("", "show: got '" + what + "', which nothing is called");
+  show.what = *named;
   show.layer = given.value("layer", "beauty");
   const std::set<std::string> known{"beauty", "depth", "normal", "transmittance", "albedo"};
   if (!known.contains(show.layer) && !show.layer.starts_with("light_"))
@@ -52,8 +49,8 @@ struct WedgeAxis {
 WedgeAxis axisOf(const nlohmann::json& given) {
   if (!given.is_object()) throw LookFault("", "wedge: rows and columns must be objects");
   WedgeAxis axis{given.value("verb", ""), given.value("option", ""), {}};
-  if (axis.verb != "cloud" && axis.verb != "render" && axis.verb != "parameters")
-    throw LookFault("", "wedge: verb must be cloud, render or parameters");
+  if (!emptySettings().contains(axis.verb))
+    throw LookFault("", "wedge: got the verb '" + axis.verb + "', which has no settings");
   if (!given.contains("values") || !given["values"].is_array() || given["values"].empty())
     throw LookFault("", "wedge: there must be values");
   for (const auto& value : given["values"]) {
@@ -89,7 +86,8 @@ void readSize(const nlohmann::json& body, int& width, int& height) {
 }
 
 std::shared_ptr<const LookPlan> planOf(const LookSubject& subject, const nlohmann::json& body) {
-  return std::make_shared<const LookPlan>(subject, checkedSettings(body.value("settings", nlohmann::json())));
+  return std::make_shared<const LookPlan>(subject, checkedSettings(body.value("settings", nlohmann::json())),
+                                          showOf(body).what);
 }
 
 LookRequest requestOf(const LookSubject& subject, const nlohmann::json& body) {
@@ -117,7 +115,8 @@ LookWedge wedgeOf(const LookSubject& subject, const nlohmann::json& body) {
     throw LookFault("", fmt::format("wedge: {} pictures, at most {}", count, LookWedge::kMostCells));
   const LookSettings settings = checkedSettings(body.value("settings", nlohmann::json()));
   const auto add = [&](const std::string& label, const LookSettings& own) {
-    wedge.cells.push_back({label, std::make_shared<const LookPlan>(subject, checkedSettings(own))});
+    wedge.cells.push_back(
+        {label, std::make_shared<const LookPlan>(subject, checkedSettings(own), wedge.show.what)});
   };
   for (const std::string& row : rows.values) {
     const LookSettings inRow = with(settings, rows, row);

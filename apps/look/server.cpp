@@ -11,7 +11,6 @@
 
 #include "apps/file_hashes.h"
 #include "apps/look/controls.h"
-#include "apps/look/exports.h"
 #include "apps/look/page_files.inc"
 #include "apps/look/requests.h"
 
@@ -225,10 +224,14 @@ void LookServer::stream(const httplib::Request& request, httplib::Response& resp
 
 nlohmann::json LookServer::controls() const {
   const LookSubject& subject = options_.subject;
+  auto views = nlohmann::json::array();
+  for (const LookShow::What what : subject.views()) views.push_back(LookShow::word(what));
   return {{"version", options_.version},
           {"input",
            {{"name", subject.path.empty() ? "a cloud of its own" : subject.path}, {"kind", subject.word()}}},
           {"has_cloud", subject.hasCloud()},
+          {"views", views},
+          {"show", LookShow::word(options_.what)},
           {"settings", options_.settings},
           {"groups", lookControls(subject)},
           {"parameters", lookParameters(subject)},
@@ -255,14 +258,19 @@ nlohmann::json LookServer::makeWedge(const nlohmann::json& body) {
   return {{"count", count}};
 }
 
-nlohmann::json LookServer::commandLines(const nlohmann::json& body) {
-  LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
+LookExports LookServer::exportsOf(const nlohmann::json& body) const {
+  const auto plan = planOf(options_.subject, body);
+  LookExports exports{options_.subject, plan->settings, plan->what};
   readSize(body, exports.width, exports.height);
-  return {{"lines", exports.typed()}};
+  return exports;
+}
+
+nlohmann::json LookServer::commandLines(const nlohmann::json& body) {
+  return {{"lines", exportsOf(body).typed()}};
 }
 
 nlohmann::json LookServer::recipe(const nlohmann::json& body) {
-  const LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
+  const LookExports exports = exportsOf(body);
   if (options_.subject.kind == LookSubject::Kind::script)
     return {{"name", std::filesystem::path(options_.subject.path).filename().string()},
             {"text", exports.script()}};
@@ -275,34 +283,43 @@ nlohmann::json LookServer::saveLook(const nlohmann::json& body) {
 }
 
 nlohmann::json LookServer::startJob(const nlohmann::json& body) {
-  LookExports exports{options_.subject, planOf(options_.subject, body)->settings};
-  readSize(body, exports.width, exports.height);
+  const LookExports exports = exportsOf(body);
   const std::string what = body.value("what", ""), file = body.value("file", "");
+  const std::map<std::string, std::vector<std::string>> endings{
+      {"exr", {".exr"}},       {"png", {".png"}}, {"vdb", {".vdb"}},
+      {"turntable", {".mp4"}}, {"pieces", {""}},  {"mesh", {".obj", ".ply"}}};
+  const auto kind = endings.find(what);
+  const bool isOfPieces = exports.what == LookShow::What::pieces,
+             isOfTransfer = exports.what == LookShow::What::transfer, isOfShapes = isOfPieces || isOfTransfer;
+  std::vector<std::string> allowed{"exr", "png", "turntable"};
+  if (isOfShapes) allowed = {isOfPieces ? "pieces" : "mesh", "png"};
+  if (options_.subject.hasCloud() && !isOfShapes) allowed.push_back("vdb");
+  if (std::ranges::count(allowed, what) == 0)
+    throw LookFault("", fmt::format("what: got '{}', allowed: {}", what, fmt::join(allowed, ", ")));
   const auto within = [&](const std::string& name) {
     return (std::filesystem::path(options_.folder) / name).string();
   };
-  const bool grows = options_.subject.hasCloud();
+  const std::string path = within(plainFileName(file, kind->second));
+  const auto append = [](std::vector<std::string>& line, const std::vector<std::string>& more) {
+    line.insert(line.end(), more.begin(), more.end());
+  };
   std::vector<std::vector<std::string>> lines;
   std::vector<std::string> temporary;
-  std::string volume = within("." + randomWord() + ".vdb");
   if (what == "vdb") {
-    if (!grows) throw LookFault("", "vdb: what is looked at is a volume already");
-    lines.push_back(exports.cloudLine(within(plainFileName(file, {".vdb"}))));
-  } else if (what == "exr" || what == "png" || what == "turntable") {
-    const bool isTurn = what == "turntable";
-    const std::string path = within(plainFileName(file, what == "png" ? std::vector<std::string>{".png"}
-                                                        : isTurn      ? std::vector<std::string>{".mp4"}
-                                                                      : std::vector<std::string>{".exr"}));
-    if (grows) {
-      lines.push_back(exports.cloudLine(volume));
+    lines.push_back(exports.volumeLine(path));
+  } else if (isOfShapes) {
+    lines.push_back(exports.shapesLine());
+    append(lines.back(), what == "png" ? exports.previewLine(path) : std::vector<std::string>{"-o", path});
+  } else {
+    const std::string volume = within("." + randomWord() + ".vdb");
+    if (options_.subject.hasCloud()) {
+      lines.push_back(exports.volumeLine(volume));
       temporary.push_back(volume);
     }
-    std::vector<std::string> line = exports.pictureLine(isTurn ? "turntable" : "render", volume);
-    line.insert(line.end(), {what == "png" ? "--preview" : isTurn ? "--movie" : "-o", path});
-    if (isTurn) line.insert(line.end(), {"--frames", body.value("frames", "1-48")});
-    lines.push_back(line);
-  } else {
-    throw LookFault("", "what: got '" + what + "', allowed: exr, png, vdb, turntable");
+    const bool isTurn = what == "turntable";
+    lines.push_back(exports.pictureLine(isTurn ? "turntable" : "render", volume));
+    append(lines.back(), {what == "png" ? "--preview" : isTurn ? "--movie" : "-o", path});
+    if (isTurn) append(lines.back(), {"--frames", body.value("frames", "1-48")});
   }
   return {{"id", jobs_.start(what, std::move(lines), std::move(temporary))}};
 }
@@ -313,9 +330,10 @@ nlohmann::json LookServer::stopJob(const nlohmann::json& body) {
 
 std::vector<std::string> LookServer::watched() const {
   std::vector<std::string> files;
-  if (!options_.subject.path.empty()) files.push_back(options_.subject.path);
+  for (const std::string* path : {&options_.subject.path, &options_.subject.reference})
+    if (!path->empty()) files.push_back(*path);
   for (const char* name : {"recipe", "texture"})
-    for (const char* verb : {"cloud", "render"})
+    for (const char* verb : {"cloud", "transfer", "render"})
       if (options_.settings[verb].contains(name))
         files.push_back(options_.settings[verb][name].get<std::string>());
   return files;
@@ -343,7 +361,8 @@ void LookServer::changed(const std::vector<std::string>& paths) {
   }
   for (LookRequest& request : again) try {
       request.hurries = false;
-      request.plan = std::make_shared<const LookPlan>(options_.subject, request.plan->settings);
+      request.plan =
+          std::make_shared<const LookPlan>(options_.subject, request.plan->settings, request.show.what);
       engine_.ask(std::move(request));
     } catch (const std::exception& error) {
       engine_.tell({{"type", "file"}, {"path", paths.front()}, {"state", "bad"}, {"message", error.what()}});

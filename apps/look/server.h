@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "apps/look/engine.h"
+#include "apps/look/exports.h"
 #include "apps/look/jobs.h"
 #include "apps/look/settings.h"
 #include "apps/look/subject.h"
@@ -21,6 +22,8 @@ namespace nephele::apps {
 
 struct LookServerOptions {
   LookSubject subject;
+  /// What is shown first.
+  LookShow::What what = LookShow::What::cloud;
   /// What was given on the command line.
   LookSettings settings;
   /// Where to listen: a name or address of this machine.
@@ -62,6 +65,7 @@ class LookServer {
   bool isFromHere(const httplib::Request& request) const;
   void stream(const httplib::Request& request, httplib::Response& response);
   nlohmann::json controls() const;
+  LookExports exportsOf(const nlohmann::json& body) const;
   nlohmann::json setSettings(const nlohmann::json& body);
   nlohmann::json makeWedge(const nlohmann::json& body);
   nlohmann::json commandLines(const nlohmann::json& body);

@@ -34,10 +34,15 @@ bool isTexts(const nlohmann::json& value) {
 LookFault::LookFault(std::string verb, const std::string& message)
     : Error(message), verb_(std::move(verb)), option_(optionIn(message)) {}
 
+LookSettings emptySettings() {
+  LookSettings result;
+  for (const char* part : {"cloud", "wisps", "cut", "transfer", "render", "parameters"})
+    result[part] = nlohmann::json::object();
+  return result;
+}
+
 LookSettings checkedSettings(const nlohmann::json& given) {
-  LookSettings result = {{"cloud", nlohmann::json::object()},
-                         {"render", nlohmann::json::object()},
-                         {"parameters", nlohmann::json::object()}};
+  LookSettings result = emptySettings();
   if (given.is_null()) return result;
   if (!given.is_object()) throw LookFault("", "settings: must be an object");
   for (const auto& [part, values] : given.items()) {

@@ -9,10 +9,22 @@
 
 namespace nephele::apps {
 
-/// What is set in the viewer: {"cloud": {...}, "render": {...}, "parameters": {...}}, by names of options of
-/// these verbs, without dashes, and of parameters of a script. Values are texts as typed, lists of texts for
-/// options that repeat, true or false for flags. What is not there is at its default.
+/// What is set in the viewer: {"cloud": {...}, "render": {...}, "parameters": {...} and so on}, by names of
+/// options of these verbs, without dashes, and of parameters of a script. Values are texts as typed, lists of
+/// texts for options that repeat, true or false for flags. What is not there is at its default.
 using LookSettings = nlohmann::json;
+
+/// All parts that there are, with nothing set.
+LookSettings emptySettings();
+
+/// Those settings of a verb that `counts` is true of, by their names, as a text: equal ones have equal texts.
+template <class Counts>
+std::string keyOf(const nlohmann::json& settings, const Counts& counts) {
+  std::string key;
+  for (const auto& [name, value] : settings.items())
+    if (counts(name)) key += name + "=" + value.dump() + ";";
+  return key;
+}
 
 /// What is wrong with a setting, as the command line says it.
 class LookFault : public Error {
@@ -27,7 +39,7 @@ class LookFault : public Error {
   std::string verb_, option_;
 };
 
-/// Settings that hold nothing but texts, lists of texts and flags, in the three parts that there are.
+/// Settings that hold nothing but texts, lists of texts and flags, in the parts that there are.
 /// @throws LookFault.
 LookSettings checkedSettings(const nlohmann::json& given);
 

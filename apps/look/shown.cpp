@@ -74,7 +74,32 @@ Image inFalseColours(const Image& image, const ViewTransform& view) {
   return result;
 }
 
+struct Kind {
+  std::string word, verb;
+};
+
+/// In the order of LookShow::What.
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all{{"cloud", "cloud"}, {"surface", "cloud"}, {"checker", "cloud"},
+                                     {"wisps", "wisps"}, {"pieces", "cut"},    {"transfer", "transfer"}};
+  return all;
+}
+
 }  // namespace
+
+const std::string& LookShow::word(What what) {
+  return kinds()[std::size_t(what)].word;
+}
+
+std::optional<LookShow::What> LookShow::named(const std::string& word) {
+  const auto found = std::ranges::find(kinds(), word, &Kind::word);
+  if (found == kinds().end()) return std::nullopt;
+  return What(found - kinds().begin());
+}
+
+std::string LookShow::verb(What what) {
+  return kinds()[std::size_t(what)].verb;
+}
 
 std::vector<std::string> LookShow::layers() const {
   if (layer == "depth") return {"Z"};
@@ -102,7 +127,7 @@ std::string shownJpeg(const Image& image, const LookShow& show, const ViewTransf
     return jpegOf(screenBytes(shown, through), shown.width, shown.height, quality);
   };
   if (show.falseColor && show.layer == "beauty") return coded(inFalseColours(image, view), plain);
-  if (show.layer == "beauty" || show.what != LookShow::What::cloud) return coded(image, view);
+  if (show.layer == "beauty" || !show.isVolume()) return coded(image, view);
   if (show.layer == "depth") {
     Image depths = opaqueOf(image, {"Z", "Z", "Z"});
     depthsToGrey(depths);

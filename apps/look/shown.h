@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,16 +12,26 @@ namespace nephele::apps {
 /// What of a picture is shown.
 struct LookShow {
   enum class What {
-    cloud,
+    cloud,    ///< Or the density that is there.
     surface,  ///< Of the cloud, or where the density is half of its most, shaded.
-    checker   ///< What the cloud grows on, with a chess board on its texture coordinates.
+    checker,  ///< What the cloud grows on, with a chess board on its texture coordinates.
+    wisps,    ///< Fine dots in place of a cloud.
+    pieces,   ///< What is cut, its pieces moved apart.
+    transfer  ///< Two meshes, and what is carried from the first to the second.
   };
+  /// What pages and the command line call it.
+  static const std::string& word(What what);
+  static std::optional<What> named(const std::string& word);
+  /// The verb whose options say what it is.
+  static std::string verb(What what);
   What what = What::cloud;
   /// "beauty", "depth", "normal", "transmittance", "albedo", or "light_NAME".
   std::string layer = "beauty";
   /// Luminance in colours, a stop each; grey is green.
   bool falseColor = false;
 
+  /// Marched, with layers; the others are surfaces, shaded in a light of their own.
+  bool isVolume() const { return what == What::cloud || what == What::wisps; }
   /// The layers that the marcher must make for it.
   std::vector<std::string> layers() const;
 };

@@ -19,10 +19,26 @@ std::string LookSubject::stamp() const {
   return path.empty() ? std::string() : fileStamp(path);
 }
 
-LookSubject LookSubject::of(const std::string& path) {
-  if (path.empty()) return {};
-  if (isScript({path})) return {Kind::script, path};
-  require(!fileStamp(path).empty(), path + ": there is no such file");
+std::vector<LookShow::What> LookSubject::views() const {
+  using What = LookShow::What;
+  std::vector<What> views{What::cloud, What::surface};
+  if (!hasCloud()) return views;
+  if (word() == "mesh") views.push_back(What::checker);
+  views.push_back(What::wisps);
+  if (!path.empty()) views.push_back(What::pieces);
+  if (!reference.empty()) views.push_back(What::transfer);
+  return views;
+}
+
+LookSubject LookSubject::of(const std::vector<std::string>& paths) {
+  if (paths.empty()) return {};
+  const std::string& path = paths.back();
+  if (paths.size() == 1 && isScript(paths)) return {Kind::script, path};
+  for (const std::string& file : paths) {
+    require(!fileStamp(file).empty(), file + ": there is no such file");
+    require(paths.size() == 1 || isMeshFile(file), file + ": of two files, both must be meshes");
+  }
+  if (paths.size() > 1) return {Kind::shape, path, paths.front()};
   return {areShapes({path}) ? Kind::shape : Kind::volume, path};
 }
 

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/look/shown.h"
+
 namespace nephele::apps {
 
 /// What is looked at.
@@ -17,14 +19,21 @@ struct LookSubject {
   /// One file, or none for a species of cloud.
   std::string path{};
 
+  /// A mesh whose attributes may be carried to that of `path`, or none.
+  std::string reference{};
+
   bool hasCloud() const { return kind == Kind::shape; }
   /// "mesh", "surface", "species", "volume" or "script".
   std::string word() const;
   /// Changes with every change of the file on disk.
   std::string stamp() const;
 
+  /// What can be shown of it.
+  std::vector<LookShow::What> views() const;
+
+  /// Of no file, of one, or of two meshes: what attributes are carried from, and to.
   /// @throws Error naming the path if there is no such file, or nobody can look at it.
-  static LookSubject of(const std::string& path);
+  static LookSubject of(const std::vector<std::string>& paths);
 };
 
 }  // namespace nephele::apps

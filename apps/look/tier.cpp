@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "nephele/levelset/cloud/wisp_volume.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/grid/voxel_grid.h"
@@ -14,10 +15,6 @@
 namespace nephele::apps {
 namespace {
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// The same density on voxels that make a quick picture of it.
 RenderVolume coarser(const RenderVolume& volume, Run& run) {
   const BrickGrid& grid = volume.density();
@@ -28,6 +25,19 @@ RenderVolume coarser(const RenderVolume& volume, Run& run) {
   run.begin("coarse density");
   return RenderVolume(bakeGrid(max(gridField(kept), 0.0f),
                                {.voxelSize = voxel, .box = volume.worldBounds(), .background = 0.0f}, run));
+}
+
+RenderVolume wispsOf(const LookPlan& plan, LookPlan::Tier tier, Run& run) {
+  const WispsArguments wisps = plan.wispsOf(tier);
+  const std::vector<WispGuide> guides = wisps.readGuides(run);
+  const WispVolumeOptions options = wisps.resolved(guides, run);
+  run.requireMemory(
+      estimatedWispBytes(guides, options),
+      "use larger voxels (a lower --resolution or a larger --voxel-size), or fewer or smaller wisps");
+  run.begin("bake");
+  const DotVolume dots = namingFile(wisps.input, [&] { return bakeWisps(guides, options, run); });
+  return volumeOf(toBricks(dots.densityGrid()), plan.picture.volumes,
+                  {plan.picture.shutter, false, plan.scene.objects.any()}, run);
 }
 
 /// Without layers that coarse voxels cannot show, and that take the most time.
@@ -91,62 +101,51 @@ std::unique_ptr<LookTier::Growing> LookTier::grown(const LookPlan& plan, Run& ru
 
 std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookTier* finer, Run& run) {
   const std::string key = plan.keys(tier_).volume;
-  if (plan.subject.hasCloud()) {
+  if (plan.growsCloud()) {
     const std::unique_ptr<Growing> growing = grown(plan, run);
     return stages_.volume(key, [&] { return growing->volume(plan, run); });
   }
   return stages_.volume(key, [&] {
+    if (plan.what == LookShow::What::wisps) return wispsOf(plan, tier_, run);
     if (finer) return coarser(*finer->volume(plan, nullptr, run), run);
     PictureOptions picture = plan.picture;
     return plan.scene.volume(picture, run);
   });
 }
 
-LookTier::Picture LookTier::surfacePicture(const LookPlan& plan, const Frame& frame, LookTier* finer,
-                                           Run& run) {
-  const bool isChecker = frame.show.what == LookShow::What::checker;
-  const PictureStages::Keys keys = plan.keys(tier_);
-  if (isChecker && !plan.subject.hasCloud())
-    throw LookFault("", "there is no mesh whose texture coordinates could be shown");
-  const std::string key = keys.shape + (isChecker ? "" : keys.levels + keys.volume);
-  const auto mesh = surface_.at(key, [&] {
-    if (isChecker) {
-      const CloudArguments& cloud = plan.cloud;
-      return stages_.shape(keys.shape, [&] { return cloud.shapeOf(cloud.shape, run); });
-    }
-    if (plan.subject.hasCloud())
-      return std::make_shared<const Mesh>(
-          marchingCubes(*toBricks(cloudSurface(*grown(plan, run)->levels, run)), 0.0f, run));
-    const auto density = volume(plan, finer, run);
-    return std::make_shared<const Mesh>(marchingCubes(density->density(), 0.5f * density->maxDensity(), run));
-  });
-  if (mesh->faceCount() == 0) throw LookFault("", "there is no surface to be seen");
-  PictureOptions picture = plan.pictureOf(tier_);
-  picture.frame.width = frame.width;
-  picture.frame.height = frame.height;
-  Extent extent{boundingBox(*mesh), double(boundingBox(*mesh).longestSide())};
-  for (const Vec3d& p : mesh->positions) extent.outline.emplace_back(p);
-  static_cast<CameraOptions&>(picture) = picture.placed(extent, run);
-  const Camera camera = picture.camera();
-  SurfaceObject object{.mesh = *mesh, .colour = kShapeColour};
-  const bool hasUv =
-      std::ranges::any_of(mesh->attributes, [](const MeshAttribute& a) { return a.name == "uv"; });
-  if (isChecker && !hasUv) throw LookFault("", "the mesh has no texture coordinates");
-  if (isChecker) object.checkers = 16;
-  SurfacePictureOptions shown;
-  shown.camera = camera;
-  shown.samples = frame.samples == 1 ? 2 : 8;
-  run.begin("surface");
-  const auto start = std::chrono::steady_clock::now();
-  std::vector<SurfaceObject> objects;
-  objects.push_back(std::move(object));
-  auto image = std::make_shared<const Image>(pictureSurfaces(std::move(objects), shown, run));
-  return {
-      image, camera, picture, extent.box, std::uint64_t(frame.width) * frame.height, 0, secondsSince(start)};
+std::shared_ptr<const Mesh> LookTier::surface(const LookPlan& plan, LookTier* finer, Run& run) {
+  if (plan.what == LookShow::What::checker)
+    return stages_.shape(plan.keys(tier_).shape, [&] { return plan.cloud.shapeOf(plan.cloud.shape, run); });
+  if (plan.growsCloud())
+    return std::make_shared<const Mesh>(
+        marchingCubes(*toBricks(cloudSurface(*grown(plan, run)->levels, run)), 0.0f, run));
+  const auto density = volume(plan, finer, run);
+  return std::make_shared<const Mesh>(marchingCubes(density->density(), 0.5f * density->maxDensity(), run));
 }
 
-LookTier::Picture LookTier::picture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run) {
-  if (frame.show.what != LookShow::What::cloud) return surfacePicture(plan, frame, finer, run);
+LookPicture LookTier::surfacePicture(const LookPlan& plan, const LookFrame& frame, LookTier* finer,
+                                     Run& run) {
+  const bool isChecker = plan.what == LookShow::What::checker;
+  const PictureStages::Keys keys = plan.keys(tier_);
+  const std::string key = keys.shape + (isChecker ? "checker" : keys.levels + keys.volume);
+  const auto shown = surface_.at(key, [&] {
+    const std::shared_ptr<const Mesh> mesh = surface(plan, finer, run);
+    if (mesh->faceCount() == 0) throw LookFault("", "there is no surface to be seen");
+    const bool hasUv =
+        std::ranges::any_of(mesh->attributes, [](const MeshAttribute& a) { return a.name == "uv"; });
+    if (isChecker && !hasUv) throw LookFault("", "the mesh has no texture coordinates");
+    std::vector<SurfaceObject> objects;
+    objects.push_back({.mesh = *mesh, .colour = kShapeColour, .checkers = isChecker ? 16 : 0});
+    return std::make_shared<const LookSurfaces>(std::move(objects));
+  });
+  return pictureOf(*shown, optionsOfSurfaces(plan, frame), frame, run);
+}
+
+LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run) {
+  // Steps of a cloud are no steps to something else.
+  if (plan.growsCloud() != isGrown_) stages_.forget();
+  isGrown_ = plan.growsCloud();
+  if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   PictureOptions picture = plan.pictureOf(tier_);
   picture.frame.width = frame.width;
   picture.frame.height = frame.height;

@@ -4,8 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "apps/look/plan.h"
-#include "apps/look/shown.h"
+#include "apps/look/picture.h"
 #include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/render/session/picture_stages.h"
 
@@ -16,28 +15,11 @@ class LookTier {
  public:
   explicit LookTier(LookPlan::Tier tier) : tier_(tier) {}
 
-  /// What a picture is to be.
-  struct Frame {
-    int width = 640, height = 360;
-    /// Rays per pixel; 0: as set.
-    int samples = 1;
-    LookShow show{};
-  };
-  struct Picture {
-    std::shared_ptr<const Image> image;
-    Camera camera;
-    /// As they were taken, with all that follows from the volume.
-    PictureOptions options;
-    Box bounds;
-    std::uint64_t rays = 0;
-    double voxelSize = 0, marchSeconds = 0;
-  };
-
   /// Whether a picture only needs to be marched.
   bool isLit(const LookPlan& plan) const { return stages_.isLit(keysOf(plan)); }
   /// Makes what is not there, and the picture. `finer`, if there is one, lends its volume where that is what
   /// is read from a file. @throws Error; Cancelled.
-  Picture picture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
+  LookPicture picture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run);
   /// Seconds that so many rays will take, from those before.
   double expectedSeconds(double rays) const { return kSecondsPerPicture + rays * secondsPerRay_; }
 
@@ -57,14 +39,18 @@ class LookTier {
   };
   std::unique_ptr<Growing> grown(const LookPlan& plan, Run& run);
   std::shared_ptr<const RenderVolume> volume(const LookPlan& plan, LookTier* finer, Run& run);
-  Picture surfacePicture(const LookPlan& plan, const Frame& frame, LookTier* finer, Run& run);
+  /// What is shown as a surface.
+  std::shared_ptr<const Mesh> surface(const LookPlan& plan, LookTier* finer, Run& run);
+  LookPicture surfacePicture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run);
 
   /// What a march takes however few its rays are; measured.
   static constexpr double kSecondsPerPicture = 0.01;
 
   LookPlan::Tier tier_;
   PictureStages stages_;
-  Stage<Mesh> surface_;
+  Stage<LookSurfaces> surface_;
+  // Whether the stages are those of a cloud that is grown.
+  bool isGrown_ = false;
   // How far layers reach, by the keys of shape, layers and volume.
   std::map<std::string, std::string> reaches_;
   double secondsPerRay_ = 1.5e-6;

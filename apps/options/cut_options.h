@@ -38,6 +38,11 @@ struct CutArguments {
   std::vector<CutPart> readParts(Run& run) const;
   /// The input is one mesh, not a volume or pieces.
   bool isModel() const;
+  /// The pieces, of parts that have level sets if these are to be cut. @throws Error naming the input.
+  Pieces cut(const std::vector<CutPart>& parts, const CutKnives& knives, Run& run) const;
+  bool hasKnives() const {
+    return !planes.empty() || randomPlanes > 0 || !knifeFiles.empty() || cellCount > 0 || !points.empty();
+  }
   /// What is written of the pieces.
   PieceFilesOptions files(const CutKnives& knives, const Run& run) const;
 };
@@ -54,6 +59,8 @@ struct CutKnives {
 
 /// @throws CLI::ValidationError if there is no knife, Error naming a file.
 Box boxOf(const std::vector<CutPart>& parts);
+/// Makes level sets of this voxel size for parts that have none. @throws Error naming the part.
+void addLevelSets(std::vector<CutPart>& parts, double voxelSize, Run& run);
 CutKnives knivesOf(const CutArguments& arguments, const std::vector<CutPart>& parts, Run& run);
 
 /// Declares the options on `app`.

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -13,7 +14,7 @@ namespace nephele::apps {
 namespace {
 
 struct LookArguments {
-  std::string host = "127.0.0.1", folder = ".";
+  std::string host = "127.0.0.1", folder = ".", show;
   int port = 8080;
   bool hasNoBrowser = false;
   const CLI::App* app = nullptr;
@@ -31,15 +32,25 @@ void bindOptions(CLI::App& app, LookArguments& options) {
   app.add_option("--folder", options.folder, "Where files that the page asks for are written.")
       ->type_name("FOLDER")
       ->default_str("where it is started");
+  app.add_option(
+         "--show", options.show,
+         "What is shown first: the cloud, its surface, the mesh with a checker, wisps, the pieces of a "
+         "cut, or what is carried from the first of two meshes to the second.")
+      ->type_name("WHAT")
+      ->check(CLI::IsMember({"cloud", "surface", "checker", "wisps", "pieces", "transfer"}))
+      ->default_str("cloud; transfer for two meshes");
   app.add_flag("--no-browser", options.hasNoBrowser, "Only print the address.");
 }
 
 void openBrowser(const std::string& address) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
   const pid_t child = fork();
-  if (child != 0) return;
-  execlp("xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
-  _exit(1);
+  if (child == 0) {
+    // Its parent ends at once, and the system's first process takes it over and waits for it.
+    if (fork() == 0) execlp("xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
+    _exit(0);
+  }
+  if (child > 0) waitpid(child, nullptr, 0);
 }
 
 void look(const LookArguments& options, Run& run) {
@@ -48,6 +59,7 @@ void look(const LookArguments& options, Run& run) {
     throw Error("--folder: " + options.folder + ": there is no such folder");
   LookServerOptions server;
   server.subject = line.subject;
+  server.what = line.what;
   server.settings = line.settings;
   server.host = options.host;
   server.port = options.port;
@@ -74,12 +86,15 @@ void look(const LookArguments& options, Run& run) {
 }  // namespace
 
 Verb lookVerb() {
-  Verb verb = verbOf("look", "Shows the cloud in a browser while it is shaped and lit.",
-                     "nephele look data/cloud_base.obj --resolution 256 --sun 90,38", bindOptions, look,
-                     "What is looked at comes after these options: a mesh, a level set, a volume, a script "
-                     "(.felt), a recipe or a file\n"
-                     "of options (.toml), or nothing, for a cloud of its own; then any options of 'nephele "
-                     "cloud' and 'nephele render'.\n");
+  Verb verb =
+      verbOf("look", "Shows the cloud in a browser while it is shaped and lit.",
+             "nephele look data/cloud_base.obj --resolution 256 --sun 90,38", bindOptions, look,
+             "What is looked at comes after these options: a mesh, two meshes, a level set, a volume, a "
+             "script (.felt), a recipe\n"
+             "or a file of options (.toml), or nothing, for a cloud of its own; then any options of "
+             "'nephele render' and of the verb\n"
+             "of what is shown: 'nephele cloud', 'nephele wisps', 'nephele cut' for pieces, 'nephele "
+             "transfer'.\n");
   verb.passesOthersOn = true;
   return verb;
 }

@@ -156,7 +156,7 @@ std::vector<Vec3f> pieceColours(std::span<const std::vector<PieceContact>> neigh
   return colours;
 }
 
-Image picturePieces(const Pieces& pieces, const PiecesPictureOptions& options, const Progress& progress) {
+std::vector<SurfaceObject> piecesObjects(const Pieces& pieces, double explode) {
   require(!pieces.pieces.empty(), "picture of pieces: there are none");
   std::vector<std::vector<PieceContact>> neighbours;
   std::vector<double> sizes;
@@ -165,11 +165,15 @@ Image picturePieces(const Pieces& pieces, const PiecesPictureOptions& options, c
     sizes.push_back(piece.mass.volume);
   }
   const std::vector<Vec3f> colours = pieceColours(neighbours, sizes);
-  const std::vector<Vec3d> offsets = explodedOffsets(pieces, options.explode);
+  const std::vector<Vec3d> offsets = explodedOffsets(pieces, explode);
   std::vector<SurfaceObject> objects;
   for (std::size_t i = 0; i < pieces.pieces.size(); ++i)
     addObjects(pieces.pieces[i], offsets[i], colours[i], objects);
-  return pictureSurfaces(std::move(objects),
+  return objects;
+}
+
+Image picturePieces(const Pieces& pieces, const PiecesPictureOptions& options, const Progress& progress) {
+  return pictureSurfaces(piecesObjects(pieces, options.explode),
                          {.width = options.width,
                           .height = options.height,
                           .azimuthDegrees = options.azimuthDegrees,

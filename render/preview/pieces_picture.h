@@ -6,6 +6,7 @@
 #include "nephele/levelset/cut/cut_parts.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
+#include "nephele/render/scene/surfaces.h"
 
 namespace nephele {
 
@@ -23,6 +24,10 @@ struct PiecesPictureOptions {
 /// other, large pieces the clearest. `neighbours` and `sizes` go by piece.
 std::vector<Vec3f> pieceColours(std::span<const std::vector<PieceContact>> neighbours,
                                 std::span<const double> sizes);
+
+/// Pieces moved apart as `explodedOffsets` says, as objects in the colours of `picturePieces`. @throws Error
+/// if there are no pieces.
+std::vector<SurfaceObject> piecesObjects(const Pieces& pieces, double explode);
 
 /// Pieces moved apart, on a ground that fades into the backdrop, each in its colour, inner faces paler; soft
 /// light of a lamp and a sky, and what faces throw on each other. Channels R, G, B, A, linear, opaque. The

@@ -258,11 +258,14 @@ Camera cameraOf(const std::vector<SurfaceObject>& objects, const SurfacePictureO
 Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options,
                       const Progress& progress) {
   require(!objects.empty(), "picture: there are no objects");
-  require(options.samples >= 1 && options.samples <= 65536,
-          fmt::format("picture: samples must be from 1 to 65536, got {}", options.samples));
   const Camera camera = cameraOf(objects, options);
   progress.begin("picture");
-  const Surfaces surfaces(std::move(objects));
+  return pictureSurfaces(Surfaces(std::move(objects)), camera, options.samples, progress);
+}
+
+Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int samples, const Progress& progress) {
+  require(samples >= 1 && samples <= 65536,
+          fmt::format("picture: samples must be from 1 to 65536, got {}", samples));
   const Box& box = surfaces.box();
   const PixelBox window = camera.window();
   const double middleX = 0.5 * (window.x0 + window.x1), middleY = 0.5 * (window.y0 + window.y1);
@@ -288,7 +291,7 @@ Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOp
         for (std::size_t y = begin; y < end; ++y)
           for (std::size_t x = 0; x < width; ++x)
             pixels[y * width + x] =
-                scene.look(std::size_t(window.x0) + x, std::size_t(window.y0) + y, options.samples);
+                scene.look(std::size_t(window.x0) + x, std::size_t(window.y0) + y, samples);
       },
       progress);
   smooth(pixels, window.width(), window.height());

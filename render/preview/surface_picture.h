@@ -32,6 +32,10 @@ constexpr Vec3f kShapeColour{0.62f, 0.6f, 0.57f};
 Image pictureSurfaces(std::vector<SurfaceObject> objects, const SurfacePictureOptions& options = {},
                       const Progress& progress = silent());
 
+/// The same of surfaces that are kept, by a camera whose lens and shutter are left out.
+Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int samples,
+                      const Progress& progress = silent());
+
 /// Memory, in bytes, that `pictureSurfaces` takes beside its objects. Measured.
 constexpr double estimateSurfacePictureBytes(int width, int height) {
   return 130.0 * width * height;

@@ -92,51 +92,91 @@ Mesh painted(const Mesh& mesh, std::size_t count, const std::function<float(std:
   return result;
 }
 
-}  // namespace
-
-Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr<const Image> texture,
-                      std::shared_ptr<const Image> objectTexture, const TransferPictureOptions& options,
-                      const Progress& progress) {
-  constexpr Vec3f kCanvas{0.92f, 0.92f, 0.92f}, kBoard{0.82f, 0.52f, 0.24f};
+/// Side by side, first the reference; both meshes have what they are painted by on their texture coordinates.
+std::vector<SurfaceObject> sideBySide(const Mesh& reference, const Mesh& object,
+                                      const TransferPictureOptions& options) {
   double left = 0;
   std::vector<SurfaceObject> objects;
   objects.push_back(placed(reference, options, left));
   left += kGap;
   objects.push_back(placed(object, options, left));
+  return objects;
+}
+
+std::vector<SurfaceObject> transferRow(const Mesh& reference, const Mesh& object,
+                                       const std::shared_ptr<const Image>& texture,
+                                       const std::shared_ptr<const Image>& objectTexture,
+                                       const TransferPictureOptions& options) {
+  constexpr Vec3f kCanvas{0.92f, 0.92f, 0.92f}, kBoard{0.82f, 0.52f, 0.24f};
+  std::vector<SurfaceObject> objects = sideBySide(reference, object, options);
   objects[0].texture = texture;
   objects[1].texture = objectTexture ? objectTexture : texture;
   for (SurfaceObject& o : objects) {
     o.colour = o.texture ? kCanvas : kBoard;
     o.checkers = o.texture ? 0 : options.checkers;
   }
-  return picture(std::move(objects), options, progress);
+  return objects;
 }
 
-Image pictureDistortion(const Mesh& reference, const Mesh& object, const TransferQuality& quality,
-                        const TransferPictureOptions& options, const Progress& progress) {
+std::vector<SurfaceObject> distortionRow(const Mesh& reference, const Mesh& object,
+                                         const TransferQuality& quality,
+                                         const TransferPictureOptions& options) {
   const auto paint = std::make_shared<const Image>(paintBox());
   // Where a triangle's colour stands in the box.
   constexpr float kKept = 0.02f, kBad = 0.7f, kWrong = 0.95f;
-  double left = 0;
-  std::vector<SurfaceObject> objects;
-  objects.push_back(placed(painted(reference, quality.isCovered.size(),
-                                   [&](std::size_t t) { return quality.isCovered[t] ? kKept : kWrong; }),
-                           options, left));
-  left += kGap;
-  objects.push_back(placed(painted(object, quality.stretch.size(),
-                                   [&](std::size_t t) {
-                                     const float stretch = quality.stretch[t];
-                                     if (std::isinf(stretch)) return kWrong;
-                                     const float share = std::log(std::max(stretch, 1.0f)) /
-                                                         std::log(TransferQuality::kBadStretch);
-                                     return kKept + (kBad - kKept) * std::min(share, 1.0f);
-                                   }),
-                           options, left));
+  const auto ofReference = [&](std::size_t t) { return quality.isCovered[t] ? kKept : kWrong; };
+  const auto ofObject = [&](std::size_t t) {
+    const float stretch = quality.stretch[t];
+    if (std::isinf(stretch)) return kWrong;
+    const float share = std::log(std::max(stretch, 1.0f)) / std::log(TransferQuality::kBadStretch);
+    return kKept + (kBad - kKept) * std::min(share, 1.0f);
+  };
+  std::vector<SurfaceObject> objects = sideBySide(painted(reference, quality.isCovered.size(), ofReference),
+                                                  painted(object, quality.stretch.size(), ofObject), options);
   for (SurfaceObject& o : objects) {
     o.texture = paint;
     o.colour = {1, 1, 1};
   }
-  return picture(std::move(objects), options, progress);
+  return objects;
+}
+
+/// Turns a row that stands across the view of azimuth 0 so that it stands across that of `azimuthDegrees`,
+/// and the shapes in it as they were.
+std::vector<SurfaceObject> turnedBack(std::vector<SurfaceObject> objects, float azimuthDegrees) {
+  const double a = double(azimuthDegrees) * M_PI / 180;
+  const double middle = boundsOf(objects[1].mesh).low.x - kGap / 2;
+  for (SurfaceObject& object : objects)
+    for (Vec3d& p : object.mesh.positions) {
+      const double x = p.x - middle;
+      p = {x * std::cos(a) + p.z * std::sin(a), p.y, p.z * std::cos(a) - x * std::sin(a)};
+    }
+  return objects;
+}
+
+}  // namespace
+
+Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr<const Image> texture,
+                      std::shared_ptr<const Image> objectTexture, const TransferPictureOptions& options,
+                      const Progress& progress) {
+  return picture(transferRow(reference, object, texture, objectTexture, options), options, progress);
+}
+
+Image pictureDistortion(const Mesh& reference, const Mesh& object, const TransferQuality& quality,
+                        const TransferPictureOptions& options, const Progress& progress) {
+  return picture(distortionRow(reference, object, quality, options), options, progress);
+}
+
+std::vector<SurfaceObject> transferObjects(const Mesh& reference, const Mesh& object,
+                                           std::shared_ptr<const Image> texture,
+                                           std::shared_ptr<const Image> objectTexture,
+                                           const TransferPictureOptions& options) {
+  return turnedBack(transferRow(reference, object, texture, objectTexture, options), options.azimuthDegrees);
+}
+
+std::vector<SurfaceObject> distortionObjects(const Mesh& reference, const Mesh& object,
+                                             const TransferQuality& quality,
+                                             const TransferPictureOptions& options) {
+  return turnedBack(distortionRow(reference, object, quality, options), options.azimuthDegrees);
 }
 
 }  // namespace nephele

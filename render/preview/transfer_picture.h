@@ -1,11 +1,13 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "nephele/levelset/warp/transfer_quality.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
+#include "nephele/render/scene/surfaces.h"
 
 namespace nephele {
 
@@ -33,5 +35,16 @@ Image pictureTransfer(const Mesh& reference, const Mesh& object, std::shared_ptr
 /// @throws Error as pictureTransfer, or if `quality` is not that of these meshes; Cancelled.
 Image pictureDistortion(const Mesh& reference, const Mesh& object, const TransferQuality& quality,
                         const TransferPictureOptions& options = {}, const Progress& progress = silent());
+
+/// What these pictures show, for a camera of one's own: two objects on the ground y = 0, the gap between them
+/// over the origin, as they stand but side by side for a camera of azimuth `options.azimuthDegrees`. Each is
+/// one unit long. @throws Error as these.
+std::vector<SurfaceObject> transferObjects(const Mesh& reference, const Mesh& object,
+                                           std::shared_ptr<const Image> texture,
+                                           std::shared_ptr<const Image> objectTexture,
+                                           const TransferPictureOptions& options = {});
+std::vector<SurfaceObject> distortionObjects(const Mesh& reference, const Mesh& object,
+                                             const TransferQuality& quality,
+                                             const TransferPictureOptions& options = {});
 
 }  // namespace nephele

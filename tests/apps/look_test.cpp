@@ -7,10 +7,13 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "tests/support/run_program.h"
@@ -24,17 +27,23 @@ using Clock = std::chrono::steady_clock;
 /// A viewer that runs for as long as this.
 class Viewer {
  public:
-  explicit Viewer(std::vector<std::string> arguments) {
+  /// `opens`: a folder with a program xdg-open, by which it opens a browser.
+  explicit Viewer(std::vector<std::string> arguments, const std::string& opens = {}) {
     int ends[2];
     if (pipe(ends) != 0) std::abort();
     arguments.insert(arguments.begin(), {"nephele", "look"});
-    arguments.insert(arguments.end(), {"--no-browser", "--port", "8300"});
+    arguments.insert(arguments.end(), {"--port", "8300"});
+    if (opens.empty()) arguments.push_back("--no-browser");
     std::vector<char*> words;
     const std::string program = test::programPath();
     for (std::string& argument : arguments) words.push_back(argument.data());
     words.push_back(nullptr);
     process_ = fork();
     if (process_ == 0) {
+      if (!opens.empty()) {
+        setenv("DISPLAY", ":0", 1);
+        setenv("PATH", (opens + ":/usr/bin:/bin").c_str(), 1);
+      }
       dup2(ends[1], STDOUT_FILENO);
       close(ends[0]);
       execv(program.c_str(), words.data());
@@ -51,6 +60,7 @@ class Viewer {
   ~Viewer() { end(); }
 
   int port() const { return port_; }
+  pid_t process() const { return process_; }
   const std::string& base() const { return base_; }
   httplib::Client client() const { return httplib::Client("127.0.0.1", port_); }
   /// "" while it runs, else how it ended.
@@ -264,6 +274,35 @@ TEST(LookVerb, TakesTheNextPortAndEndsAtOnce) {
   EXPECT_LT(seconds, 2);
 }
 
+/// Children of a process that have ended, and that it has not waited for.
+int unreapedChildren(pid_t parent) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream file(entry.path() / "stat");
+    std::string line;
+    if (!std::getline(file, line)) continue;
+    std::istringstream words(line.substr(line.rfind(')') + 1));
+    char state = 0;
+    pid_t its = 0;
+    words >> state >> its;
+    count += its == parent && state == 'Z';
+  }
+  return count;
+}
+
+TEST(LookVerb, WaitsForTheBrowserThatItHasOpened) {
+  const test::TemporaryFolder folder;
+  const std::string opened = folder.file("opened");
+  std::ofstream(folder.file("xdg-open")) << "#!/bin/sh\necho \"$1\" > " << opened << "\n";
+  std::filesystem::permissions(folder.file("xdg-open"), std::filesystem::perms::owner_all);
+  const Viewer viewer(small(), folder.file(""));
+  for (int i = 0; i != 500 && test::textOf(opened).empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_NE(test::textOf(opened).find(viewer.base()), std::string::npos);
+  EXPECT_EQ(viewer.client().Get((viewer.base() + "controls").c_str())->status, 200);
+  EXPECT_EQ(unreapedChildren(viewer.process()), 0);
+}
+
 TEST(LookVerb, WritesWhereItIsToldAndNowhereElse) {
   const test::TemporaryFolder folder;
   std::vector<std::string> arguments = small();
@@ -284,6 +323,169 @@ TEST(LookVerb, WritesWhereItIsToldAndNowhereElse) {
   EXPECT_EQ(all.back()["state"], "done") << all.back();
   EXPECT_TRUE(std::filesystem::exists(folder.file("picture.exr")));
   EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+/// How a job ends that `viewer` is asked for.
+Json endOfJob(const Viewer& viewer, const std::string& what, const std::string& file, Json body) {
+  body["what"] = what;
+  body["file"] = file;
+  const auto all = viewer.messages(
+      "a", [&] { EXPECT_EQ(viewer.post("job", body)->status, 200); },
+      [](const Json& message) { return message["type"] == "job" && message["state"] != "running"; });
+  return all.empty() ? Json() : all.back();
+}
+
+TEST(LookVerb, WritesWholePicturesAndTurntables) {
+  const test::TemporaryFolder folder;
+  std::vector<std::string> arguments = small();
+  arguments.insert(arguments.end(), {"--quality", "draft", "--folder", folder.file("")});
+  const Viewer viewer(arguments);
+  EXPECT_EQ(endOfJob(viewer, "png", "picture.png", settings(1))["state"], "done");
+  const std::string png = test::textOf(folder.file("picture.png"));
+  EXPECT_TRUE(png.starts_with("\x89PNG"));
+  // Its last chunk, without content, and the check sum of that.
+  EXPECT_TRUE(png.ends_with(std::string("\0\0\0\0IEND\xae\x42\x60\x82", 12)));
+  Json turn = settings(1);
+  turn["frames"] = "1-3";
+  const Json end = endOfJob(viewer, "turntable", "turn.mp4", turn);
+  if (std::system("command -v ffmpeg > /dev/null") != 0) {
+    EXPECT_EQ(end["state"], "failed");
+    EXPECT_EQ(folder.entryCount(), 1u);
+    return;
+  }
+  EXPECT_EQ(end["state"], "done") << end;
+  // The index comes last in a movie: without it nothing can be played.
+  const std::string movie = test::textOf(folder.file("turn.mp4"));
+  EXPECT_NE(movie.find("ftyp"), std::string::npos);
+  EXPECT_NE(movie.find("moov"), std::string::npos);
+  EXPECT_EQ(folder.entryCount(), 2u);
+}
+
+TEST(LookVerb, StopsAJobAtOnceAndLeavesNothingOfIt) {
+  const test::TemporaryFolder folder;
+  const Viewer viewer(
+      {test::ownData("data/cloud_base.obj"), "--resolution", "160", "--folder", folder.file("")});
+  for (const auto& [what, file] : {std::pair{"png", "a.png"}, {"turntable", "a.mp4"}, {"vdb", "a.vdb"}}) {
+    Json body = settings(1, {{"resolution", "160"}});
+    body["size"] = {640, 360};
+    body["what"] = what;
+    body["file"] = file;
+    Clock::time_point asked;
+    bool isAsked = false;
+    const auto all = viewer.messages(
+        "a", [&] { EXPECT_EQ(viewer.post("job", body)->status, 200); },
+        [&](const Json& message) {
+          if (message["type"] != "job") return false;
+          // Once it has begun to work.
+          if (message["state"] == "running" && message["fraction"] > 0 && !isAsked) {
+            asked = Clock::now();
+            isAsked = true;
+            EXPECT_EQ(viewer.post("stop", {{"id", message["id"]}})->body, "{\"stopped\":true}");
+          }
+          return message["state"] != "running";
+        });
+    ASSERT_FALSE(all.empty());
+    EXPECT_EQ(all.back()["state"], "stopped") << all.back();
+    // 0.2 s are promised; a busy machine gets more.
+    EXPECT_LT(std::chrono::duration<double>(Clock::now() - asked).count(), 1) << what;
+    EXPECT_EQ(folder.entryCount(), 0u) << what;
+  }
+}
+
+/// The last picture of the first view of a viewer, and what came before.
+Json pictureOf(const Viewer& viewer, Json body) {
+  const auto all = viewer.messages(
+      "a", [&] { EXPECT_EQ(viewer.post("settings", body)->status, 200); }, isFinal);
+  return all.empty() ? Json({{"type", "nothing"}}) : all.back();
+}
+
+Json shown(Json body, const std::string& what) {
+  body["show"] = {{"what", what}};
+  return body;
+}
+
+TEST(LookVerb, ShowsThePiecesOfACut) {
+  const test::TemporaryFolder folder;
+  const Viewer viewer({test::ownData("data/cloud_base.obj"), "--show", "pieces", "--plane=0,0.5,0,0,1,0",
+                       "--folder", folder.file("")});
+  const Json controls = Json::parse(viewer.client().Get((viewer.base() + "controls").c_str())->body);
+  EXPECT_EQ(controls["show"], "pieces");
+  EXPECT_EQ(controls["settings"]["cut"]["plane"], Json::array({"0,0.5,0,0,1,0"}));
+  Json body = shown(settings(1), "pieces");
+  body["settings"]["cut"] = controls["settings"]["cut"];
+  body["settings"]["cut"]["explode"] = "0";
+  const Json together = pictureOf(viewer, body);
+  ASSERT_EQ(together["type"], "picture") << together;
+  body["revision"] = 2;
+  body["settings"]["cut"]["explode"] = "1";
+  const Json apart = pictureOf(viewer, body);
+  ASSERT_EQ(apart["type"], "picture") << apart;
+  // Both halves go up and down, and what is at rest keeps its box.
+  const auto height = [](const Json& picture) {
+    return picture["bounds"][1][1].get<double>() - picture["bounds"][0][1].get<double>();
+  };
+  EXPECT_GT(height(apart), 1.2 * height(together));
+  body["settings"]["cut"]["plane"] = Json::array({"0,1"});
+  EXPECT_EQ(viewer.post("settings", body)->status, 422);
+  body["settings"]["cut"] = {{"output", folder.file("x")}};
+  EXPECT_EQ(viewer.post("settings", body)->status, 422);
+  // Without a knife it is one piece.
+  body["settings"]["cut"] = Json::object();
+  body["revision"] = 3;
+  EXPECT_EQ(pictureOf(viewer, body)["type"], "picture");
+  body["settings"]["cut"] = {{"plane", Json::array({"0,0.5,0,0,1,0"})}};
+  const Json lines = Json::parse(viewer.post("command", body)->body)["lines"];
+  EXPECT_NE(lines[0].get<std::string>().find("nephele cut"), std::string::npos);
+  EXPECT_EQ(endOfJob(viewer, "pieces", "pieces", body)["state"], "done");
+  EXPECT_TRUE(std::filesystem::exists(folder.file("pieces/piece_0002.obj")));
+  EXPECT_EQ(folder.entryCount(), 1u);
+}
+
+TEST(LookVerb, ShowsWhatIsCarriedFromOneMeshToAnother) {
+  const test::TemporaryFolder folder;
+  const Viewer viewer({test::ownData("data/sphere_uv.obj"), test::ownData("data/cloud_base.obj"), "--quality",
+                       "fast", "--folder", folder.file("")});
+  const Json controls = Json::parse(viewer.client().Get((viewer.base() + "controls").c_str())->body);
+  EXPECT_EQ(controls["show"], "transfer");
+  EXPECT_EQ(controls["settings"]["transfer"]["quality"], "fast");
+  Json body = shown(settings(1), "transfer");
+  body["settings"]["transfer"] = controls["settings"]["transfer"];
+  const Json picture = pictureOf(viewer, body);
+  ASSERT_EQ(picture["type"], "picture") << picture;
+  EXPECT_EQ(picture["turns"], true);
+  // Both stand on the ground, each at most one unit long, the gap between them over the origin.
+  EXPECT_NEAR(picture["bounds"][0][1].get<double>(), 0, 1e-5);
+  EXPECT_LE(picture["bounds"][1][1].get<double>(), 1.001);
+  body["settings"]["transfer"]["preview-paint"] = "distortion";
+  body["revision"] = 2;
+  EXPECT_EQ(pictureOf(viewer, body)["type"], "picture");
+  EXPECT_EQ(endOfJob(viewer, "mesh", "object.obj", body)["state"], "done");
+  EXPECT_NE(test::textOf(folder.file("object.obj")).find("\nvt "), std::string::npos);
+  EXPECT_EQ(viewer.post("settings", shown(settings(3), "nothing"))->status, 422);
+}
+
+TEST(LookVerb, ShowsWispsByTheirLook) {
+  const Viewer viewer({"--look", "wisps", "--dots", "2000", "--resolution", "40"});
+  const Json controls = Json::parse(viewer.client().Get((viewer.base() + "controls").c_str())->body);
+  EXPECT_EQ(controls["show"], "wisps");
+  EXPECT_EQ(controls["settings"]["wisps"]["dots"], "2000");
+  EXPECT_EQ(controls["settings"]["render"]["phase"], "mie:8");
+  std::map<std::string, Json> looks;
+  for (const Json& look : controls["looks"]) looks[look["name"]] = look;
+  for (const char* name :
+       {"humilis", "congestus", "storm", "wisps", "silver-lining", "sunset", "smoke", "explosion"}) {
+    EXPECT_EQ(looks.count(name), 1u) << name;
+    EXPECT_EQ(viewer.client().Get((viewer.base() + "look/" + name + ".jpg").c_str())->status, 200) << name;
+  }
+  EXPECT_EQ(looks["wisps"]["show"], "wisps");
+  EXPECT_EQ(looks["wisps"]["settings"]["wisps"]["dots"], "2000000");
+  Json body = shown(settings(1), "wisps");
+  body["settings"]["wisps"] = controls["settings"]["wisps"];
+  const Json picture = pictureOf(viewer, body);
+  ASSERT_EQ(picture["type"], "picture") << picture;
+  EXPECT_GT(picture["voxels"], 20);
+  // And back: steps of the one are not taken for those of the other.
+  EXPECT_EQ(pictureOf(viewer, settings(2, {{"resolution", "32"}, {"layers", "1"}}))["type"], "picture");
 }
 
 TEST(LookVerb, GivesTheLookBackAsCommandLinesAndAsAFile) {
@@ -347,6 +549,11 @@ TEST(LookVerb, RefusesWhatItCannotLookAt) {
   EXPECT_EQ(test::runProgram("look --no-browser --amplitud=1").exitCode, 2);
   EXPECT_EQ(test::runProgram("look --no-browser --port 0").exitCode, 2);
   EXPECT_EQ(test::runProgram("look --no-browser --folder /nonexistent").exitCode, 1);
+  const std::string mesh = test::ownData("data/cloud_base.obj");
+  EXPECT_EQ(test::runProgram("look --no-browser --show pieces").exitCode, 2);
+  EXPECT_EQ(test::runProgram("look " + mesh + " --no-browser --show transfer").exitCode, 2);
+  EXPECT_EQ(test::runProgram("look " + mesh + " --no-browser --show pieces --amplitude 1%").exitCode, 2);
+  EXPECT_EQ(test::runProgram("look " + mesh + " missing.obj --no-browser").exitCode, 1);
 }
 
 }  // namespace

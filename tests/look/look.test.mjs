@@ -7,6 +7,8 @@ import { after, before, describe, test } from "node:test";
 import { apart, difference, LookPage } from "./page.mjs";
 import { folderFor, kRoot, kSmall, startBrowser, startProgram, startWire } from "./program.mjs";
 
+// Models that the repository makes; where they are, pictures for docs/ are of them.
+const kExamples = [join(kRoot, "build/examples"), join(kRoot, "examples")].find((folder) => existsSync(join(folder, "whale.obj")));
 const kLimit = { timeout: 90000 };
 // JPEG at another quality or level is nearer than this; what changes is farther.
 const kSame = 3;
@@ -281,6 +283,97 @@ describe("a cloud", () => {
     assert.ok((await look.settings()).settings.render["camera-position"]);
     assert.ok(difference(before, await look.small()) > kSame);
     await look.screenshot("phone");
+  });
+});
+
+describe("surfaces", () => {
+  test("a mesh is cut, and a slider moves its pieces apart", kLimit, async (t) => {
+    const folder = folderFor(t);
+    const mesh = kExamples ? join(kExamples, "hare.obj") : join(kRoot, "data/cloud_base.obj");
+    const program = await startProgram(t, [mesh, "--show", "pieces", "--random-planes", "6"], folder);
+    const look = await LookPage.open(t, browser, program.address, { width: 1200, height: 700 });
+    assert.equal(await look.value("#what"), "pieces");
+    const names = await look.tab.$$eval(".control", (all) => all.filter((one) => !one.hidden).map((one) => `${one.dataset.verb} ${one.dataset.name}`));
+    assert.ok(names.includes("cut random-planes") && names.includes("render fov"), String(names));
+    assert.ok(!names.some((name) => name.startsWith("cloud ") || name === "render sun"), String(names));
+    assert.equal(await look.tab.$eval("#dome", (dome) => dome.getClientRects().length), 0);
+    const before = await look.small();
+    const { x, y, width } = await look.middle("[data-name=explode] input[type=range]");
+    await look.drag({ x: x - 0.3 * width, y }, { x: x - 0.15 * width, y });
+    await look.finished();
+    assert.match(await look.value("#cut-explode"), /^0\.[67]\d*$/);
+    const apart_ = await look.small();
+    assert.ok(difference(before, apart_) > kSame);
+    await look.tab.mouse.move(200, 300);
+    await look.screenshot("pieces");
+    await look.type("#cut-random-planes", "2");
+    await look.finished();
+    assert.ok(difference(apart_, await look.small()) > kSame);
+    await look.tab.click("#open-out");
+    await look.says("#out-lines", /nephele cut .*--random-planes=2/);
+    await look.tab.click("[data-job-of=pieces]");
+    await look.says(".job[data-state=done]", /Done/);
+    assert.ok(existsSync(join(folder, "pieces/piece_0002.obj")));
+    await look.tab.click("#out .close");
+    await look.tab.select("#what", "cloud");
+    await look.finished();
+    assert.ok(await look.tab.$eval("#dome", (dome) => dome.getClientRects().length > 0));
+    await look.tab.click("#undo");
+    await look.finished();
+    assert.equal(await look.value("#what"), "pieces");
+  });
+
+  test("texture coordinates are carried to another mesh, and both turn in their places", kLimit, async (t) => {
+    const folder = folderFor(t);
+    const meshes = kExamples ? [join(kExamples, "clownfish.obj"), join(kExamples, "whale.obj")] : [join(kRoot, "data/sphere_uv.obj"), join(kRoot, "data/cloud_base.obj")];
+    const program = await startProgram(t, [...meshes, "--quality", kExamples ? "balanced" : "fast"], folder);
+    const look = await LookPage.open(t, browser, program.address, { width: 1200, height: 700 });
+    assert.equal(await look.value("#what"), "transfer");
+    const before = await look.small();
+    await look.screenshot("transfer");
+    const { x, y } = await look.middle("#picture");
+    // Half a turn: each still stands where it stood.
+    const { width } = await look.middle("#picture");
+    await look.drag({ x: x - width / 4, y }, { x: x + width / 4, y });
+    await look.finished();
+    assert.ok(difference(before, await look.small()) > 1);
+    const [[left], [right]] = [await look.mean(0.1, 0.45), await look.mean(0.55, 0.9)];
+    const [ground] = await look.mean(0.49, 0.51);
+    assert.ok(left < ground - 3 && right < ground - 3, `${[left, ground, right]}`);
+    await look.tab.select("#transfer-preview-paint", "distortion");
+    await look.finished();
+    await look.screenshot("distortion");
+  });
+
+  test("wisps come with their look", kLimit, async (t) => {
+    const folder = folderFor(t);
+    const program = await startProgram(t, kSmall, folder);
+    const look = await LookPage.open(t, browser, program.address);
+    await look.tab.click("#open-looks");
+    await look.tab.waitForFunction(() => document.querySelector("[data-look=wisps] img")?.naturalWidth === 240);
+    await look.screenshot("looks_wisps");
+    await look.tab.click("[data-look=wisps]");
+    await look.tab.waitForFunction(() => document.getElementById("what").value === "wisps");
+    await look.type("#wisps-dots", "3000");
+    await look.type("#wisps-resolution", "48");
+    await look.finished();
+    assert.equal((await look.settings()).settings.render.phase, "mie:8");
+    await look.screenshot("wisps");
+  });
+});
+
+describe("an export", () => {
+  test("is stopped by its button and leaves nothing", kLimit, async (t) => {
+    const { look, folder } = await cloud(t);
+    const before = readdirSync(folder).sort();
+    await look.type("#cloud-resolution", "160");
+    await look.finished();
+    await look.tab.click("#open-out");
+    await look.tab.click("[data-job-of=turntable]");
+    await look.tab.waitForSelector(".job[data-state=running] button");
+    await look.tab.click(".job[data-state=running] button");
+    await look.says(".job[data-state=stopped]", /Stopped/);
+    assert.deepEqual(readdirSync(folder).sort(), before);
   });
 });
 

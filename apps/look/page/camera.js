@@ -74,6 +74,8 @@ export class Camera {
       look_at: (numbers("camera-position") && numbers("look-at")) ?? target,
       up: numbers("up") ?? [0, 1, 0],
       fov,
+      // Shapes in a row, which stands across the view from wherever the camera is.
+      turns: message.turns,
       wide: wide > 0 ? Number(this.#settings.get("render", "orthographic-width") ?? wide) : 0,
     };
   }
@@ -95,13 +97,21 @@ export class Camera {
   }
 
   #orbit(right, down) {
-    const { position, look_at: target } = this.#own;
-    const away = minus(position, target), distance = length(away);
+    const { position, look_at, turns } = this.#own;
+    const away = minus(position, look_at), distance = length(away);
     let [azimuth, elevation] = anglesOf(away).map((degrees) => degrees * kRadians);
     azimuth -= right;
+    const target = turns ? this.#turned(look_at, -right) : look_at;
+    this.#own.look_at = target;
     elevation = Math.min(kPole, Math.max(-kPole, elevation + down));
     const flat = Math.cos(elevation);
     this.#own.position = add(target, times([Math.sin(azimuth) * flat, Math.sin(elevation), Math.cos(azimuth) * flat], distance));
+  }
+
+  /** Round the vertical axis through the origin, by an angle from +z towards +x. */
+  #turned([x, y, z], angle) {
+    const c = Math.cos(angle), s = Math.sin(angle);
+    return [x * c + z * s, y, z * c - x * s];
   }
 
   /** By shares of the picture's width. */

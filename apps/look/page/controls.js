@@ -2,6 +2,9 @@ import { byId, labelOf, make, makeSvg } from "./dom.js";
 import { RampEditor, rampOf } from "./ramp.js";
 import { fromHex, fromSlider, isTyped, numberOf, textOf, toHex, toSlider } from "./values.js";
 
+/** Whether the lights of the settings are seen in what is shown. */
+export const isLit = (what) => what === "cloud" || what === "wisps";
+
 const kFormOfChoice = /[A-Z:]/;
 
 /** The panel: a control for each option that the program names, and for each parameter of a script. */
@@ -10,6 +13,8 @@ export class Controls {
   #commit;
   #all = [];
   #search = byId("search");
+  // For which the controls are shown.
+  #view = "";
 
   constructor(settings, commit) {
     this.#settings = settings;
@@ -20,7 +25,7 @@ export class Controls {
   build({ groups, parameters }) {
     const state = new Map([...byId("groups").children].map((group) => [group.dataset.name, group.open]));
     this.#all = [];
-    this.#settings.table = { cloud: {}, render: {}, parameters: {} };
+    this.#settings.clearTable();
     const script = parameters.map((parameter) => ({
       ...parameter,
       verb: "parameters",
@@ -46,9 +51,10 @@ export class Controls {
   }
 
   update() {
+    if (this.#view !== this.#settings.show.what) this.#filter();
     for (const control of this.#all) control.update();
     for (const group of byId("groups").children) {
-      const changed = group.querySelectorAll(".control.changed").length;
+      const changed = group.querySelectorAll(".control.changed:not([hidden])").length;
       group.querySelector("small").textContent = changed ? `${changed} set` : "";
     }
   }
@@ -74,8 +80,10 @@ export class Controls {
   #filter() {
     const words = this.#search.value.toLowerCase().split(/[\s-]+/).filter(Boolean);
     let found = 0;
+    this.#view = this.#settings.show.what;
     for (const control of this.#all) {
-      const isFound = words.every((word) => control.words.includes(word));
+      const views = control.control.views;
+      const isFound = (!views || views.includes(this.#view)) && words.every((word) => control.words.includes(word));
       control.element.hidden = !isFound;
       found += isFound;
     }
@@ -91,6 +99,8 @@ export class Controls {
       }
     }
     byId("none").hidden = found > 0;
+    // Surfaces are shown in a light of their own.
+    byId("dome").hidden = byId("angles").hidden = !isLit(this.#view);
     byId("light").hidden = words.length > 0;
   }
 }

@@ -1,5 +1,5 @@
 import { Camera } from "./camera.js";
-import { Controls } from "./controls.js";
+import { Controls, isLit } from "./controls.js";
 import { byId, labelOf, make } from "./dom.js";
 import { History } from "./history.js";
 import { Looks } from "./looks.js";
@@ -18,7 +18,8 @@ const settings = new Settings();
 const history_ = new History();
 const picture = new Picture();
 const stream = new Stream();
-const commit = () => history_.add(settings.copy());
+const state = () => ({ settings: settings.copy(), what: settings.show.what });
+const commit = () => history_.add(state());
 const body = () => ({ settings: settings.copy(), size: sizeOfPicture(), show: { ...settings.show } });
 const sender = new Sender(body);
 const controls = new Controls(settings, commit);
@@ -182,7 +183,7 @@ function update() {
   dome.update(picture.message?.camera);
   byId("what").value = settings.show.what;
   byId("layer").value = settings.show.layer;
-  byId("layer").disabled = settings.show.what !== "cloud";
+  byId("layer").disabled = !isLit(settings.show.what);
   byId("false-color").setAttribute("aria-pressed", String(settings.show.false_color));
 }
 
@@ -217,8 +218,8 @@ history_.addEventListener("change", () => {
   byId("redo").disabled = !history_.canRedo;
 });
 
-function step(state) {
-  if (state) settings.replace(state);
+function step(to) {
+  if (to) settings.replace(to.settings, { what: to.what });
 }
 
 // Pixel values.
@@ -254,7 +255,10 @@ byId("picture").addEventListener("pointerleave", () => {
 
 byId("undo").addEventListener("click", () => step(history_.undo()));
 byId("redo").addEventListener("click", () => step(history_.redo()));
-byId("what").addEventListener("change", (event) => settings.setShow({ what: event.target.value }));
+byId("what").addEventListener("change", (event) => {
+  settings.setShow({ what: event.target.value });
+  commit();
+});
 byId("layer").addEventListener("change", (event) => settings.setShow({ layer: event.target.value }));
 byId("size").addEventListener("change", () => settings.setShow({}));
 byId("false-color").addEventListener("click", () => settings.setShow({ false_color: !settings.show.false_color }));
@@ -348,14 +352,14 @@ async function load(isAgain = false) {
   wedge.reset();
   outputs.setInput(given);
   dome.setDefault(settings.table.render.sun?.default ?? "");
-  for (const what of ["surface", "checker"]) byId("what").querySelector(`[value=${what}]`).disabled = what === "checker" && given.input.kind !== "mesh";
+  for (const option of byId("what").options) option.hidden = option.disabled = !given.views.includes(option.value);
   if (isLoaded) {
     if (isAgain) dropGoneParameters(given.parameters);
     ask(false);
     return;
   }
-  adopt(fromFragment(location.hash) ?? { settings: given.settings });
-  history_.begin(settings.copy());
+  adopt(fromFragment(location.hash) ?? { settings: given.settings, show: { what: given.show } });
+  history_.begin(state());
   isLoaded = true;
   lastSize = sizeOfPicture().join("x");
   ask(false);

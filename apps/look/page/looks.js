@@ -1,9 +1,10 @@
 import { byId, make } from "./dom.js";
+import { clone } from "./settings.js";
 import { get, post } from "./stream.js";
 
 const kKept = "nephele-look-";
 // They say how finely something is made, not how it looks.
-const kKeptByUser = [["cloud", "resolution"], ["cloud", "voxel-size"], ["render", "quality"], ["render", "samples"]];
+const kKeptByUser = [["cloud", "resolution"], ["cloud", "voxel-size"], ["wisps", "resolution"], ["wisps", "voxel-size"], ["render", "quality"], ["render", "samples"]];
 
 /** The dialog of looks: those that ship and those that the user saved. */
 export class Looks {
@@ -36,7 +37,7 @@ export class Looks {
       const image = source ? make("img", { src: source, alt: "", loading: "lazy" }) : blank();
       image.addEventListener("error", () => image.replaceWith(blank()));
       const button = make("button", { type: "button", class: `tile ${kind}`, "data-look": look.name }, image, make("span", {}, kind === "own" ? look.name : look.name.replaceAll("-", " ")));
-      button.addEventListener("click", () => this.#take(look.settings));
+      button.addEventListener("click", () => this.#take(look));
       return button;
     };
     byId("looks-list").replaceChildren(
@@ -45,14 +46,17 @@ export class Looks {
     );
   }
 
-  #take(settings) {
-    const next = { cloud: { ...settings.cloud }, render: { ...settings.render }, parameters: this.#settings.copy().parameters };
+  #take({ settings, show }) {
+    const now = this.#settings.copy();
+    // One that was saved has all parts and keeps to what is seen; one that ships is of a cloud or of wisps.
+    const parts = show ? [show, "render"] : Object.keys(settings);
+    const next = { ...now, ...Object.fromEntries(parts.map((part) => [part, clone(settings[part])])), parameters: now.parameters };
     for (const [verb, name] of kKeptByUser) {
       const own = this.#settings.get(verb, name);
       if (own === undefined) delete next[verb][name];
       else next[verb][name] = own;
     }
-    this.#settings.replace(next);
+    this.#settings.replace(next, show ? { what: show } : {});
     this.#commit();
     byId("looks").close();
   }
@@ -65,7 +69,7 @@ export class Looks {
       return;
     }
     try {
-      await post("save-look", { name, settings: this.#settings.copy() });
+      await post("save-look", { name, settings: this.#settings.copy(), show: this.#settings.show });
       try {
         localStorage.setItem(kKept + name, this.#picture.thumbnail(240));
       } catch {

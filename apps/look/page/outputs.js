@@ -32,7 +32,18 @@ const kKinds = [
   { what: "vdb", title: "Volume", file: "cloud.vdb", action: "Write", needsCloud: true },
   { what: "turntable", title: "Turntable", file: "cloud.mp4", second: "1-48", label: "Frames", action: "Render" },
 ];
-const kWords = { exr: "EXR picture", png: "PNG preview", vdb: "Volume", turntable: "Turntable", script: "Script" };
+// Of views that are no volumes.
+const kKindsOf = {
+  pieces: [
+    { what: "pieces", title: "Pieces", file: "pieces", action: "Write" },
+    { what: "png", title: "PNG preview", file: "pieces.png", second: "1280x720", label: "Size in pixels", action: "Render" },
+  ],
+  transfer: [
+    { what: "mesh", title: "Mesh", file: "object_uv.obj", action: "Write" },
+    { what: "png", title: "PNG preview", file: "transfer.png", second: "1280x720", label: "Size in pixels", action: "Render" },
+  ],
+};
+const kWords = { exr: "EXR picture", png: "PNG preview", vdb: "Volume", turntable: "Turntable", script: "Script", pieces: "Pieces", mesh: "Mesh" };
 
 /** The dialog for what comes out: command lines, recipes, and files that the program writes. */
 export class Outputs {
@@ -40,6 +51,9 @@ export class Outputs {
   #body;
   #jobs = new Map();
   #lines = [];
+  #hasCloud = false;
+  // Those that are offered.
+  #kinds = null;
 
   constructor(settings, body) {
     this.#settings = settings;
@@ -52,7 +66,8 @@ export class Outputs {
 
   setInput({ has_cloud: hasCloud, input }) {
     byId("out-recipe").textContent = input.kind === "script" ? "Save the script" : "Save as recipe";
-    byId("jobs-new").replaceChildren(...kKinds.filter((kind) => hasCloud || !kind.needsCloud).map((kind) => this.#new(kind)));
+    this.#hasCloud = hasCloud;
+    this.#kinds = null;
   }
 
   take({ id, what, state, fraction, stage, message }) {
@@ -83,19 +98,26 @@ export class Outputs {
     byId("out-error").textContent = "";
     byId("out").showModal();
     try {
-      const { settings, size } = this.#body();
+      const { settings, size, show } = this.#body();
+      this.#offer(kKindsOf[show.what] ?? kKinds);
       // The same frame as the one that is seen.
       for (const input of document.querySelectorAll("#jobs-new [data-size]")) input.value = size[0] > 640 ? size.join("x") : `1280x${2 * Math.round((640 * size[1]) / size[0])}`;
-      this.#lines = (await post("command", { settings, size })).lines;
+      this.#lines = (await post("command", { settings, size, show })).lines;
       byId("out-lines").textContent = this.#lines.join("\n");
     } catch (error) {
       byId("out-lines").textContent = error.message;
     }
   }
 
+  #offer(kinds) {
+    if (kinds === this.#kinds) return;
+    this.#kinds = kinds;
+    byId("jobs-new").replaceChildren(...kinds.filter((kind) => this.#hasCloud || !kind.needsCloud).map((kind) => this.#new(kind)));
+  }
+
   async #recipe() {
     try {
-      const { name, text } = await post("recipe", { settings: this.#settings.copy() });
+      const { name, text } = await post("recipe", { settings: this.#settings.copy(), show: this.#body().show });
       download(name, text);
       this.#say(`${name} is saved by the browser.`);
     } catch (error) {
@@ -109,9 +131,9 @@ export class Outputs {
     const start = make("button", { type: "button", "data-job-of": kind.what }, kind.action);
     start.addEventListener("click", async () => {
       byId("out-error").textContent = "";
-      const { settings, size } = this.#body();
+      const { settings, size, show } = this.#body();
       const typed = /^(\d+)x(\d+)$/.exec(second.value ?? "");
-      const body = { page: kPage, what: kind.what, file: file.value.trim(), settings, size: typed ? [Number(typed[1]), Number(typed[2])] : size };
+      const body = { page: kPage, what: kind.what, file: file.value.trim(), settings, show, size: typed ? [Number(typed[1]), Number(typed[2])] : size };
       if (kind.what === "turntable") body.frames = second.value.trim();
       try {
         await post("job", body);

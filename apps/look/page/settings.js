@@ -1,5 +1,6 @@
-const clone = (value) => JSON.parse(JSON.stringify(value));
-const whole = (settings) => ({ cloud: {}, render: {}, parameters: {}, ...clone(settings ?? {}) });
+export const clone = (value) => JSON.parse(JSON.stringify(value));
+const empty = () => ({ cloud: {}, wisps: {}, cut: {}, transfer: {}, render: {}, parameters: {} });
+const whole = (settings) => ({ ...empty(), ...clone(settings ?? {}) });
 
 /**
  * What is looked at: settings of the verbs and what of the picture is shown. "change" is sent for each change, with `hurry` while
@@ -9,7 +10,7 @@ export class Settings extends EventTarget {
   values = whole({});
   show = { what: "cloud", layer: "beauty", false_color: false };
   /** verb -> name -> control */
-  table = { cloud: {}, render: {}, parameters: {} };
+  table = empty();
 
   get(verb, name) {
     return this.values[verb][name];
@@ -29,14 +30,20 @@ export class Settings extends EventTarget {
     this.#changed(hurry);
   }
 
-  replace(values, hurry = false) {
+  replace(values, show = {}) {
     this.values = whole(values);
-    this.#changed(hurry);
+    Object.assign(this.show, show);
+    this.#changed(false);
   }
 
   setShow(values) {
     Object.assign(this.show, values);
     this.#changed(false);
+  }
+
+  /** Forgets the controls that there were. */
+  clearTable() {
+    this.table = empty();
   }
 
   copy() {

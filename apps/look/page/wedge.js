@@ -2,12 +2,17 @@ import { byId, labelOf, make } from "./dom.js";
 import { kPage, post } from "./stream.js";
 import { fromSlider, isTyped, numberOf, textOf, toSlider } from "./values.js";
 
+// What the rows are of until somebody says so.
+const kFirst = { wisps: "wisps clump", pieces: "cut random-planes", transfer: "transfer checker" };
+
 /** The dialog in which pictures for several values of one or two options stand side by side; a click takes those of one. */
 export class Wedge {
   #settings;
   #commit;
   #body;
   #axes = [];
+  // For which the axes are.
+  #view = "";
   #revision = 0;
   #cells = [];
   #addresses = [];
@@ -22,7 +27,9 @@ export class Wedge {
   }
 
   #open() {
-    if (this.#axes.length === 0) this.#axes = [this.#axis("Rows", "amplitude"), this.#axis("Columns", "")];
+    if (this.#view !== this.#settings.show.what) this.reset();
+    this.#view = this.#settings.show.what;
+    if (this.#axes.length === 0) this.#axes = [this.#axis("Rows", kFirst[this.#view] ?? "cloud amplitude"), this.#axis("Columns", "")];
     byId("wedge").showModal();
   }
 
@@ -37,7 +44,7 @@ export class Wedge {
     if (!first) select.append(make("option", { value: "" }, "none"));
     for (const [verb, controls] of Object.entries(this.#settings.table))
       for (const control of Object.values(controls))
-        if (!["flag", "file"].includes(control.type) && !control.repeats && !["view", "camera-position", "look-at", "up"].includes(control.name))
+        if ((control.views ?? [this.#view]).includes(this.#view) && !["flag", "file"].includes(control.type) && !control.repeats && !["view", "camera-position", "look-at", "up"].includes(control.name))
           select.append(make("option", { value: `${verb} ${control.name}` }, labelOf(control.name)));
     const values = make("input", { "aria-label": `${title}: values, with commas between them`, placeholder: "values, with commas between them", autocomplete: "off", spellcheck: "false" });
     const suggest = () => {
@@ -46,7 +53,7 @@ export class Wedge {
       values.disabled = !control;
     };
     select.addEventListener("change", suggest);
-    const wanted = [...select.options].find((option) => option.value === `cloud ${first}`);
+    const wanted = [...select.options].find((option) => option.value === first);
     if (wanted) select.value = wanted.value;
     suggest();
     byId("wedge-axes").append(make("div", { class: "axis" }, make("span", { class: "muted" }, title), select, values));

@@ -64,6 +64,19 @@ TEST(PiecesPicture, LiesInTheShadeBelowThePieces) {
   EXPECT_LT(right, 0.97 * left);
 }
 
+TEST(PiecesPicture, HasObjectsThatAreMovedApart) {
+  const auto height = [](double explode) {
+    Box box;
+    for (const SurfaceObject& object : piecesObjects(halves(), explode))
+      box = box.including(boundingBox(object.mesh));
+    return double(box.size().y);
+  };
+  EXPECT_NEAR(height(0), 2, 1e-6);
+  // Centroids half above and half below the middle go as far again.
+  EXPECT_NEAR(height(1), 3, 1e-6);
+  EXPECT_THROW(piecesObjects({}, 0), Error);
+}
+
 TEST(PiecesPicture, RefusesNothingAndOddSampleCounts) {
   EXPECT_THROW(picturePieces({}, {}), Error);
   EXPECT_THROW(picturePieces(halves(), {.width = 8, .height = 8, .samples = 0}), Error);

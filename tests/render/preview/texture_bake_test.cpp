@@ -180,5 +180,28 @@ TEST(PictureTransfer, ShowsBothShapesEquallyLarge) {
   EXPECT_THROW(pictureTransfer(mesh, icosphere(1, 1), red, nullptr), Error);
 }
 
+TEST(TransferObjects, StandSideBySideForAnyAzimuthAndAreNotTurned) {
+  // A square in the plane z = 0: seen from the side it has no width, and the row is as long as its gap.
+  const Mesh mesh = square(1, same);
+  for (const float azimuth : {0.0f, 90.0f}) {
+    const auto objects = transferObjects(mesh, mesh, nullptr, nullptr, {.azimuthDegrees = azimuth});
+    ASSERT_EQ(objects.size(), 2u);
+    const Box left = boundingBox(objects[0].mesh), right = boundingBox(objects[1].mesh);
+    for (const Box& box : {left, right}) {
+      EXPECT_NEAR(box.size().x, 1, 1e-5);
+      EXPECT_NEAR(box.size().z, 0, 1e-5);
+      EXPECT_NEAR(box.min.y, 0, 1e-6);
+    }
+    // To the right of a camera in front is +x, of one at +x it is -z.
+    if (azimuth == 0) {
+      EXPECT_NEAR(left.max.x, -right.min.x, 1e-5);
+      EXPECT_GT(right.min.x, 0);
+    } else {
+      EXPECT_NEAR(left.min.z, -right.max.z, 1e-5);
+      EXPECT_LT(right.max.z, 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace nephele::test
