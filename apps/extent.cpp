@@ -1,5 +1,7 @@
 #include "apps/extent.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "nephele/levelset/io/point_io.h"
@@ -28,6 +30,15 @@ void Extent::include(const Extent& other) {
   longestSide = std::max(longestSide, other.longestSide);
   outline.insert(outline.end(), other.outline.begin(), other.outline.end());
   typicalDensity = std::max(typicalDensity, other.typicalDensity);
+}
+
+std::string Extent::text() const {
+  std::string text = fmt::format("{} {}", longestSide, typicalDensity);
+  const auto add = [&](const Vec3f& p) { text += fmt::format(" {},{},{}", p.x, p.y, p.z); };
+  add(box.min);
+  add(box.max);
+  for (const Vec3f& point : outline) add(point);
+  return text;
 }
 
 Extent extentOfFile(const std::string& path) {

@@ -19,6 +19,8 @@ struct Extent {
 
   /// Goes on to describe this and the other input, taken together.
   void include(const Extent& other);
+  /// Equal ones have equal texts.
+  std::string text() const;
 };
 
 /// Extent of a mesh or points, or of the first grid of a volume that holds numbers: of a level set, of its

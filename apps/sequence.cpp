@@ -93,6 +93,32 @@ void requireFrames(const std::string& name, const std::vector<int>& frames,
                             missing.size() == 1 ? "is" : "are", rangesOf(missing)));
 }
 
+void requireSameGrids(const std::vector<int>& frames, const std::function<std::string(int frame)>& path,
+                      const Run& run) {
+  const std::string firstPath = path(frames.front());
+  if (!isVolumeFile(firstPath)) return;
+  const Grids first(firstPath);
+  bool isNoted = false;
+  for (const int frame : frames) {
+    run.check();
+    const std::string own = path(frame);
+    const Grids other(own);
+    const auto listed = [&] {
+      return fmt::format("{}: its grids are {}, and those of {} are {}", own, other.text(), firstPath,
+                         first.text());
+    };
+    if (other.first != first.first)
+      throw Error(listed() + ": the first of numbers must be the same in all frames");
+    const bool differs = other.names != first.names || other.voxelSize != first.voxelSize;
+    if (differs && !isNoted)
+      run.note(other.names != first.names
+                   ? listed()
+                   : fmt::format("{}: its voxels are {:g} wide, and those of {} {:g}", own, other.voxelSize.x,
+                                 firstPath, first.voxelSize.x));
+    isNoted = isNoted || differs;
+  }
+}
+
 std::optional<Sequence> Sequence::of(const std::vector<std::string>& arguments) {
   if (!givenTo("--frames", arguments)) return std::nullopt;
   return Sequence(arguments);
@@ -160,38 +186,15 @@ void Sequence::requireNumberedOutputs(const CLI::App& first) const {
   }
 }
 
-void Sequence::requireSameGrids(const File& file, const Run& run) const {
-  const std::string firstPath = file.path(range_.frames().front());
-  if (!isVolumeFile(firstPath)) return;
-  const Grids first(firstPath);
-  bool isNoted = false;
-  for (const int frame : range_.frames()) {
-    run.check();
-    const std::string path = file.path(frame);
-    const Grids other(path);
-    const auto listed = [&] {
-      return fmt::format("{}: its grids are {}, and those of {} are {}", path, other.text(), firstPath,
-                         first.text());
-    };
-    if (other.first != first.first)
-      throw Error(listed() + ": the first of numbers must be the same in all frames");
-    const bool differs = other.names != first.names || other.voxelSize != first.voxelSize;
-    if (differs && !isNoted)
-      run.note(other.names != first.names
-                   ? listed()
-                   : fmt::format("{}: its voxels are {:g} wide, and those of {} {:g}", path,
-                                 other.voxelSize.x, firstPath, first.voxelSize.x));
-    isNoted = isNoted || differs;
-  }
-}
-
 void Sequence::check(const CLI::App& first, const Run& run) const {
   requireNumberedOutputs(first);
   const std::vector<File> files = inputs(first);
   for (const File& file : files)
     requireFrames(file.word->pattern.text().substr(file.start), range_.frames(),
                   [&](int frame) { return file.path(frame); });
-  for (const File& file : files) requireSameGrids(file, run);
+  for (const File& file : files)
+    requireSameGrids(
+        range_.frames(), [&](int frame) { return file.path(frame); }, run);
   for (const CLI::Option* option : first.get_options())
     for (const std::string& value : option->results())
       if (isOutput(*option) && wordOf(value)) {

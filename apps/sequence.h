@@ -19,6 +19,12 @@ std::vector<int> chosenFrames(const FrameRange& range, const std::string& only, 
 void requireFrames(const std::string& name, const std::vector<int>& frames,
                    const std::function<std::string(int frame)>& path);
 
+/// Refuses volumes of which one has another first grid of numbers than that of the first frame, or is a level
+/// set where that is not; notes other differences. Files that are no volumes are left alone.
+/// @throws Error naming the file.
+void requireSameGrids(const std::vector<int>& frames, const std::function<std::string(int frame)>& path,
+                      const Run& run);
+
 /// One of the calls that a command line stands for.
 struct Call {
   /// "frame 12"
@@ -71,7 +77,6 @@ class Sequence {
   const Word* wordOf(const std::string& value) const;
   std::vector<File> inputs(const CLI::App& first) const;
   void requireNumberedOutputs(const CLI::App& first) const;
-  void requireSameGrids(const File& file, const Run& run) const;
 
   std::vector<std::string> arguments_;
   FrameRange range_;

@@ -34,15 +34,6 @@ std::optional<Extent> measured(const Verb& verb, const SeveralCalls& calls, Prog
   return all;
 }
 
-std::string textOf(const Extent& range) {
-  std::string text = fmt::format("{} {}", range.longestSide, range.typicalDensity);
-  const auto add = [&](const Vec3f& p) { text += fmt::format(" {},{},{}", p.x, p.y, p.z); };
-  add(range.box.min);
-  add(range.box.max);
-  for (const Vec3f& point : range.outline) add(point);
-  return text;
-}
-
 /// What the call makes, but for streams.
 std::vector<std::string> outputsOf(const CLI::App& app) {
   std::vector<std::string> files;
@@ -89,7 +80,7 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       run.beginPart(call.name, 0.05 + share * double(i), 0.05 + share * double(i + 1));
       run.part->digest = optionsDigest(
           command.app, kNotOfCalls,
-          fmt::format("{} {}", call.part.framesSinceFirst, range ? textOf(*range) : ""), run.files);
+          fmt::format("{} {}", call.part.framesSinceFirst, range ? range->text() : ""), run.files);
       const bool skips = calls.skipExisting && isThere(command, run.part->digest, run);
       skipped += skips;
       if (!skips) command.bound.body(run);

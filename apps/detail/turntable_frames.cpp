@@ -1,9 +1,9 @@
 // Frames, movie and contact sheet of the verb turntable.
 //
-// The light is made once where it does not move as the volume sees it, and the sky's part of it once in any
-// case; with a script that is sampled anew, anew. The movie and the sheet are made of the files in the end,
-// so that they are the same whether frames were made now or by an earlier call; or of the frames as they are
-// made, rounded as files would, where there are to be no files.
+// The light is made once for each volume where it does not move as the volume sees it, and the sky's part of
+// it once in any case; with a script that is sampled anew, anew. The movie and the sheet are made of the
+// files in the end, so that they are the same whether frames were made now or by an earlier call; or of the
+// frames as they are made, rounded as files would, where there are to be no files.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -12,7 +12,7 @@
 #include <cmath>
 #include <future>
 
-#include "apps/detail/turntable_plan.h"
+#include "apps/detail/turntable_scene.h"
 #include "apps/options/picture/live_picture.h"
 #include "apps/options/picture/picture_files.h"
 #include "nephele/modeling/base/error.h"
@@ -47,19 +47,31 @@ class FrameProgress : public SubProgress {
   mutable std::atomic<bool> isPicture_{false};
 };
 
-// Makes one frame after another of a volume.
+// Makes one frame after another.
 class FrameMaker {
  public:
-  FrameMaker(const PictureOptions& picture, SceneVolume& scene, const Turntable& turntable,
-             const Camera& start, int first, const Run& run)
-      : picture_(picture), scene_(scene), turntable_(turntable), start_(start), run_(run) {
-    sampleFor(camera(first), run);
-    if (!picture_.pathTraced && !turntable.lightsMove()) makeLight(picture_.lights, run);
+  FrameMaker(TurntableScene& scene, const Turntable& turntable, const Camera& start, const Run& run)
+      : scene_(scene), turntable_(turntable), start_(start), run_(run) {}
+
+  // Whether nothing is left to be done before the picture of `frame`.
+  bool isReadyFor(const TurntableFrame& frame) const { return scene_.isOf(frame) && isReady_; }
+
+  void prepare(const TurntableFrame& frame, Run& run) {
+    if (!scene_.isOf(frame)) {
+      // It refers to the volume.
+      light_.reset();
+      scene_.turnTo(frame, run);
+      scene_.requireMemory(start_, run);
+    }
+    sampleFor(camera(frame.number), run);
+    const PictureOptions& picture = scene_.picture();
+    if (!picture.pathTraced && !turntable_.lightsMove()) makeLight(picture.lights, run);
+    isReady_ = true;
   }
 
   Camera camera(int frame) const {
     const Camera camera = turntable_.camera(start_, frame);
-    const Shutter& shutter = picture_.shutter;
+    const Shutter& shutter = scene_.picture().shutter;
     if (shutter.isInstant() || start_.isMoving() || !turntable_.cameraMoves()) return camera;
     std::vector<Camera> poses;
     for (int i = 0; i != kPoses; ++i)
@@ -71,17 +83,18 @@ class FrameMaker {
   RenderResult make(int frame, const Camera& camera, const std::shared_ptr<const Holdout>& holdout,
                     const Progress& progress) {
     sampleFor(camera, progress);
-    if (picture_.pathTraced) {
-      PictureOptions picture = picture_;
-      picture.render.holdout = holdout;
-      picture.lights = turntable_.lights(picture_.lights, frame);
-      if (picture_.shutter.isInstant()) picture.render.nextCamera = turntable_.camera(start_, frame + 1);
-      return picture.picture(scene_.volume(), camera, progress);
+    const PictureOptions& picture = scene_.picture();
+    if (picture.pathTraced) {
+      PictureOptions own = picture;
+      own.render.holdout = holdout;
+      own.lights = turntable_.lights(picture.lights, frame);
+      if (picture.shutter.isInstant()) own.render.nextCamera = turntable_.camera(start_, frame + 1);
+      return own.picture(scene_.volume(), camera, progress);
     }
-    if (turntable_.lightsMove() || !light_) makeLight(turntable_.lights(picture_.lights, frame), progress);
-    RenderOptions options = picture_.marched(camera);
+    if (turntable_.lightsMove() || !light_) makeLight(turntable_.lights(picture.lights, frame), progress);
+    RenderOptions options = picture.marched(camera);
     options.holdout = holdout;
-    if (picture_.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
+    if (picture.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
     return light_->render(camera, options, progress);
   }
 
@@ -95,25 +108,23 @@ class FrameMaker {
     if (!voxelSize) return;
     light_.reset();
     scene_.resample(*voxelSize, progress);
-    const RenderVolume& volume = scene_.volume();
-    picture_.render.step = picture_.stepThrough(volume);
-    run_.requireMemory(double(volume.memoryBytes()) + picture_.estimateBytes(volume, camera),
-                       "make the picture smaller (--size)");
+    scene_.requireMemory(camera, run_);
   }
 
   void makeLight(const Lights& lights, const Progress& progress) {
+    const PictureOptions& picture = scene_.picture();
     light_ = light_ ? light_->underOther(lights, progress)
-                    : LitVolume(scene_.volume(), picture_.medium, lights, picture_.render.octaves, progress,
-                                picture_.render.surfaces);
+                    : LitVolume(scene_.volume(), picture.medium, lights, picture.render.octaves, progress,
+                                picture.render.surfaces);
     lightSeconds_ += light_->lightSeconds();
   }
 
-  PictureOptions picture_;
-  SceneVolume& scene_;
+  TurntableScene& scene_;
   const Turntable& turntable_;
   const Camera& start_;
   const Run& run_;
   std::optional<LitVolume> light_;
+  bool isReady_ = false;
   double lightSeconds_ = 0;
 };
 
@@ -210,35 +221,45 @@ void makeReel(const TurntablePlan& plan, const TurntableOptions& options, Reel& 
 
 }  // namespace
 
-void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& given,
-                SceneVolume& scene, const Camera& start, Run& run) {
-  PictureOptions picture = given;
-  LivePicture live(picture.displayServer, options.name(), picture.render);
-  const Vec3f middle = scene.volume().isEmpty() ? Vec3f{} : scene.volume().worldBounds().center();
-  const Turntable turntable(options.orbit, middle, plan.first, plan.last, options.turns);
+void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableScene& scene,
+                const Camera& start, LivePicture& live, Run& run) {
+  const Box& box = scene.picture().seen.box;
+  const Turntable turntable(options.orbit, box.isEmpty() ? Vec3f{} : box.center(), plan.first(), plan.last(),
+                            options.turns);
+  // The same for all volumes.
+  const ViewTransform screen = scene.picture().screen;
   std::vector<TurntableFrame*> missing;
   for (TurntableFrame& frame : plan.frames) {
     if (frame.skipped && !frame.preview.empty() && !frame.previewSkipped)
-      writePng(frame.preview, readImage(frame.path), picture.screen, metadataOf(picture, run, frame.number));
+      writePng(frame.preview, readImage(frame.path), screen, metadataOf(scene.picture(), run, frame.number));
     if (!frame.skipped) missing.push_back(&frame);
   }
   double marchSeconds = 0;
   std::uint64_t rays = 0, samples = 0, deepSamples = 0;
   std::size_t notFinite = 0;
-  Reel reel(options, int(plan.frames.size()), picture.screen);
-  FrameWriter writer(picture.screen, reel);
-  std::optional<FrameMaker> maker;
-  if (!missing.empty()) maker.emplace(picture, scene, turntable, start, missing.front()->number, run);
-  run.expect(0.05, reel.isWanted() && !options.output.empty() ? 0.95 : 1.0);
-  run.begin("frames");
+  Reel reel(options, int(plan.frames.size()), screen);
+  FrameWriter writer(screen, reel);
+  FrameMaker maker(scene, turntable, start, run);
+  const double end = reel.isWanted() && !options.output.empty() ? 0.95 : 1.0;
+  // The stage of frames begins anew behind every new volume.
+  std::size_t stageBegin = 0;
   for (std::size_t i = 0; i != missing.size(); ++i) try {
       TurntableFrame& frame = *missing[i];
       const auto began = std::chrono::steady_clock::now();
-      const FrameProgress progress(run, i, missing.size());
-      const Camera camera = maker->camera(frame.number);
+      if (!maker.isReadyFor(frame)) {
+        const double share = (end - 0.05) / double(missing.size()), from = 0.05 + share * double(i);
+        if (i > 0) run.expect(from, from + 0.5 * share, 4);
+        maker.prepare(frame, run);
+        stageBegin = i;
+        run.expect(from, end);
+        run.begin("frames");
+      }
+      const PictureOptions& picture = scene.picture();
+      const FrameProgress progress(run, i - stageBegin, missing.size() - stageBegin);
+      const Camera camera = maker.camera(frame.number);
       const auto holdout =
           frame.holdout.empty() ? nullptr : readHoldout(frame.holdout, camera, run.memoryLimitBytes);
-      RenderResult result = maker->make(frame.number, camera, holdout, progress);
+      RenderResult result = maker.make(frame.number, camera, holdout, progress);
       picture.addSky(result.image, camera, turntable.lights(picture.lights, frame.number));
       live.complete(result.image);
       // Also where a frame has no work that would ask.
@@ -247,7 +268,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
           frame.path.empty() ? fmt::format("{}: frame {}", options.name(), frame.number) : frame.path,
           result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
-      metadata[kPartDigest] = plan.digest;
+      metadata[kPartDigest] = frame.digest;
       deepSamples += result.deep ? result.deep->sampleCount() : 0;
       marchSeconds += result.marchSeconds;
       rays += result.rays;
@@ -255,8 +276,8 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
       writer.write(frame, std::move(result), camera, std::move(metadata));
       if (i + 1 == missing.size()) writer.finish();
       frame.seconds = secondsSince(began);
-      frame.voxelSize = maker->voxelSize();
-      run.advance(double(i + 1) / double(missing.size()));
+      frame.voxelSize = maker.voxelSize();
+      run.advance(double(i + 1 - stageBegin) / double(missing.size() - stageBegin));
     } catch (const Cancelled&) {
       writer.finish();
       run.note(
@@ -270,7 +291,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const Pict
   run.stats["rays"] = rays;
   run.stats["samples"] = samples;
   if (!options.scene.deep.empty()) run.stats["deep_samples"] = deepSamples;
-  run.stats["light_seconds"] = maker ? maker->lightSeconds() : 0.0;
+  run.stats["light_seconds"] = maker.lightSeconds();
   run.stats["march_seconds"] = marchSeconds;
   for (const TurntableFrame& frame : plan.frames) {
     nlohmann::json made{{"frame", frame.number}, {"seconds", frame.seconds}, {"skipped", frame.skipped}};

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <string_view>
 
 #include "apps/options_digest.h"
@@ -62,29 +63,12 @@ const std::string& TurntableOptions::name() const {
   return scene.deep;
 }
 
-TurntablePlan::TurntablePlan(const TurntableOptions& options, Run& run) {
-  const FrameRange range = parsed("--frames", [&] { return FrameRange::parse(options.frames); });
-  first = range.first();
-  last = range.last();
-  for (const std::string& input : options.scene.inputs)
-    if (FramePattern::places(input) != 0 && !std::filesystem::exists(input))
-      throw CLI::ValidationError(
-          "input", fmt::format("got '{}', a volume for each frame, but turntable turns around one; make the "
-                               "frames by render --frames, and turn by a --camera FILE that moves",
-                               input));
-  digest = optionsDigest(*options.app, kNotOfPictures, fmt::format("{}-{}", first, last), run.files);
+TurntablePlan::TurntablePlan(const TurntableOptions& options, Run& run)
+    : options_(options), range_(parsed("--frames", [&] { return FrameRange::parse(options.frames); })) {
+  checkSheets();
   const auto output = patternOf("--output", options.output),
              preview = patternOf("--preview", options.preview);
-  for (const auto& [name, path] :
-       {std::pair{"--movie", options.movie}, {"--contact-sheet", options.contactSheet}})
-    for (const auto& [other, value] : {std::pair{"--shard", options.shard}, {"--only", options.only}})
-      if (!path.empty() && !value.empty())
-        throw CLI::ValidationError(name,
-                                   fmt::format("shows all frames, and {} makes some of them; when all are "
-                                               "there, call again with --skip-existing and without {}",
-                                               other, other));
-
-  const std::vector<int> numbers = chosenFrames(range, options.only, options.shard);
+  const std::vector<int> numbers = chosenFrames(range_, options.only, options.shard);
   const auto deep = patternOf("--deep", options.scene.deep);
   const std::string& holdout = options.scene.holdout;
   // One for all will do where nothing but the light moves.
@@ -99,6 +83,94 @@ TurntablePlan::TurntablePlan(const TurntableOptions& options, Run& run) {
       refuseValue("--contact-sheet", options.contactSheet, "another file than that of a frame of --preview");
     else if (!frame.deep.empty() && (frame.deep == frame.path || frame.deep == frame.holdout))
       refuseValue("--deep", options.scene.deep, "another file than those of --output and --holdout");
+  if (!frames.empty()) findVolumes(run);
+}
+
+void TurntablePlan::checkSheets() const {
+  for (const auto& [name, path] :
+       {std::pair{"--movie", options_.movie}, {"--contact-sheet", options_.contactSheet}})
+    for (const auto& [other, value] : {std::pair{"--shard", options_.shard}, {"--only", options_.only}})
+      if (!path.empty() && !value.empty())
+        throw CLI::ValidationError(name,
+                                   fmt::format("shows all frames, and {} makes some of them; when all are "
+                                               "there, call again with --skip-existing and without {}",
+                                               other, other));
+}
+
+void TurntablePlan::findVolumes(Run& run) {
+  for (const std::string& input : options_.scene.inputs) {
+    // Where such a file is there, the sign is as good a letter as any.
+    const bool isPattern = FramePattern::places(input) != 0 && !std::filesystem::exists(input);
+    const auto& pattern = inputs_.emplace_back(isPattern ? patternOf("input", input) : std::nullopt);
+    if (pattern) requireFrames(input, range_.frames(), [&](int frame) { return pattern->path(frame); });
+  }
+  for (const auto& pattern : inputs_)
+    if (pattern)
+      requireSameGrids(
+          range_.frames(), [&](int frame) { return pattern->path(frame); }, run);
+  for (TurntableFrame& frame : frames) {
+    frame.inputs = inputsOf(frame.number);
+    frame.volumeKey = volumeKeyOf(frame.number, run);
+  }
+}
+
+bool TurntablePlan::volumeChanges() const {
+  return std::ranges::any_of(inputs_, [](const auto& pattern) { return pattern.has_value(); });
+}
+
+std::vector<std::string> TurntablePlan::inputsOf(int frame) const {
+  std::vector<std::string> paths = options_.scene.inputs;
+  for (std::size_t i = 0; i != paths.size(); ++i)
+    if (inputs_[i]) paths[i] = inputs_[i]->path(frame);
+  return paths;
+}
+
+std::string TurntablePlan::volumeKeyOf(int frame, Run& run) const {
+  if (!volumeChanges()) return "";
+  ContentHash hash;
+  for (const std::string& path : inputsOf(frame)) hash.add(run.files.of(path));
+  // Expressions may know the frame.
+  if (!options_.picture.volumes.color.empty() || isScript(options_.scene.inputs))
+    hash.add(std::to_string(frame));
+  return hash.text();
+}
+
+void TurntablePlan::measure(const PictureOptions& picture, Run& run) const {
+  if (!volumeChanges()) return;
+  std::optional<Extent> all;
+  std::set<std::string> measured;
+  run.expect(0, 0.05, int(range_.frames().size()));
+  for (const int frame : range_.frames()) {
+    run.check();
+    if (!measured.insert(volumeKeyOf(frame, run)).second) continue;
+    SceneOptions scene = options_.scene;
+    scene.inputs = inputsOf(frame);
+    run.part = Run::Part{.frame = frame};
+    const bool stands = options_.orbit == Orbit::light;
+    const Extent one = stands ? scene.extent(picture, run) : scene.measured(picture, run);
+    all ? all->include(one) : void(all = one);
+    if (!stands) all->outline = sweptCorners(all->outline);
+  }
+  run.part = Run::Part{.range = all};
+}
+
+void TurntablePlan::setDigests(Run& run) {
+  std::vector<std::string_view> others(std::begin(kNotOfPictures), std::end(kNotOfPictures));
+  const bool changes = volumeChanges(), hidesAnew = FramePattern::places(options_.scene.holdout) != 0;
+  if (changes) others.push_back("input");
+  if (hidesAnew) others.push_back("holdout");
+  const std::string all = optionsDigest(
+      *options_.app, others, fmt::format("{}-{}{}", first(), last(), changes ? run.part->range->text() : ""),
+      run.files);
+  for (TurntableFrame& frame : frames) {
+    frame.digest = all;
+    if (!changes && !hidesAnew) continue;
+    ContentHash hash;
+    hash.add(all);
+    hash.add(frame.volumeKey);
+    if (hidesAnew) hash.add(run.files.of(frame.holdout));
+    frame.digest = hash.text();
+  }
 }
 
 void prepareFolders(const TurntableOptions& options, const TurntablePlan& plan) {
@@ -133,7 +205,7 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run) {
             return what.empty();
           };
           frame.skipped =
-              isWhole(frame.path, plan.digest) && (frame.deep.empty() || isWhole(frame.deep, plan.digest));
+              isWhole(frame.path, frame.digest) && (frame.deep.empty() || isWhole(frame.deep, frame.digest));
           frame.previewSkipped = frame.skipped && isWhole(frame.preview, "");
         }
       },

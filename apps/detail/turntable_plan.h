@@ -11,6 +11,9 @@
 
 namespace nephele::apps {
 
+class LivePicture;
+class TurntableScene;
+
 /// The options of the verb turntable, as typed.
 struct TurntableOptions {
   SceneOptions scene;
@@ -33,6 +36,12 @@ struct TurntableFrame {
   int number = 0;
   /// "" where no such picture is wanted, or nothing stands in front.
   std::string path, preview, deep, holdout;
+  std::vector<std::string> inputs{};
+  /// Frames of equal ones show the same volume.
+  std::string volumeKey{};
+  /// Says what the frame is made of: the options that its pixels depend on, as typed, the contents of the
+  /// files that these name, first and last frame, and the version of the program. The attribute kPartDigest.
+  std::string digest{};
   /// The files are there and whole, and are left as they are.
   bool skipped = false, previewSkipped = false;
   double seconds = 0;
@@ -41,17 +50,35 @@ struct TurntableFrame {
 };
 
 /// What a call of the verb has to make.
-struct TurntablePlan {
-  /// First and last of the whole turntable, of which `frames` may be a part.
-  int first = 0, last = 0;
-  std::vector<TurntableFrame> frames;
-  /// Says what frames are made of: the options that their pixels depend on, as typed, the contents of the
-  /// files that these name, first and last, and the version of the program. The attribute kPartDigest of the
-  /// frames.
-  std::string digest;
-
-  /// @throws CLI::ValidationError naming the option that is wrong.
+class TurntablePlan {
+ public:
+  /// @throws CLI::ValidationError naming the option that is wrong; Error naming volumes or holdouts that are
+  /// missing, or a volume with other grids than that of the first frame.
   TurntablePlan(const TurntableOptions& options, Run& run);
+
+  /// Where the volume changes from frame to frame, reads it in all of the whole turntable and makes what is
+  /// chosen from it that of all, see Run::Part::range. @throws as SceneOptions::volume.
+  void measure(const PictureOptions& picture, Run& run) const;
+  /// Fills in the digests of the frames. `measure` comes first.
+  void setDigests(Run& run);
+
+  /// First and last of the whole turntable, of which `frames` may be a part.
+  int first() const { return range_.first(); }
+  int last() const { return range_.last(); }
+
+  std::vector<TurntableFrame> frames;
+
+ private:
+  void checkSheets() const;
+  void findVolumes(Run& run);
+  std::vector<std::string> inputsOf(int frame) const;
+  std::string volumeKeyOf(int frame, Run& run) const;
+  bool volumeChanges() const;
+
+  const TurntableOptions& options_;
+  FrameRange range_;
+  /// Of every input; nothing where it is the same in all frames.
+  std::vector<std::optional<FramePattern>> inputs_;
 };
 
 /// Makes the folders of all outputs, and finds out whether files can be written there.
@@ -66,7 +93,7 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run);
 /// need the memory of as many pictures, and be no faster. Then makes the movie and the contact sheet, where
 /// they are wanted, of all frames. A script is sampled anew for every camera that asks for other voxels, and
 /// so is its light. Fills in the frames' seconds and the run's statistics.
-void makeFrames(TurntablePlan& plan, const TurntableOptions& options, const PictureOptions& picture,
-                SceneVolume& scene, const Camera& start, Run& run);
+void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableScene& scene,
+                const Camera& start, LivePicture& live, Run& run);
 
 }  // namespace nephele::apps

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 
-#include "apps/detail/turntable_plan.h"
+#include "apps/detail/turntable_scene.h"
+#include "apps/options/picture/live_picture.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
 namespace {
 
 void bindOptions(CLI::App& app, TurntableOptions& options) {
-  addSceneInputs(app, options.scene, "Densities to look at (.vdb, .nvdb); where they overlap they add up.");
+  addSceneInputs(
+      app, options.scene,
+      "Densities to look at (.vdb, .nvdb); where they overlap they add up. A name with ####, %04d or $F4 "
+      "is a volume for each frame.");
   CLI::Option* output = addOutput(
       app, "-o,--output", options.output, {".exr"},
       "Pictures to write; ####, %04d or $F4 in the name stands for the frame number.", OutputTrial::verb);
@@ -61,27 +65,24 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   TurntablePlan plan(options, run);
   if (plan.frames.empty()) return run.note("no frame of --frames is in this share; nothing to do");
   PictureOptions picture = options.picture.withView();
-  run.expect(0, 0.05, 4);
   prepareFolders(options, plan);
-  SceneVolume scene = options.scene.sceneVolume(picture, run);
-  const RenderVolume& volume = scene.volume();
-  picture = picture.resolved(volume, run);
-  const bool isShown = !options.preview.empty() || !options.movie.empty() || !options.contactSheet.empty();
-  options.scene.addTo(picture, volume, isShown, run);
-  const Camera start = firstCamera(options, picture);
+  plan.measure(picture, run);
+  plan.setDigests(run);
+  run.expect(0, 0.05, 4);
+  LivePicture live(picture.displayServer, options.name(), picture.render);
+  TurntableScene scene(options, picture, plan.frames.front(), run);
+  const Camera start = firstCamera(options, scene.picture());
   const int width = start.window().width(), height = start.window().height();
-  // Moving lights are made while those of the frame before are still there.
-  const double bytes = picture.estimateBytes(volume, start);
-  run.requireMemory(double(volume.memoryBytes()) + (options.orbit == Orbit::camera ? 1 : 2) * bytes,
-                    "make the picture smaller (--size), or the volume with larger voxels");
+  scene.requireMemory(start, run);
   if (!options.movie.empty()) MovieWriter::tryOut(options.movie, width, height, options.movieOptions);
   if (options.skipExisting) skipExisting(plan, start, run);
-  makeFrames(plan, options, picture, scene, start, run);
-  run.stats["extinction"] = *picture.extinction;
+  makeFrames(plan, options, scene, start, live, run);
+  const float extinction = *scene.picture().extinction;
+  run.stats["extinction"] = extinction;
   run.result(fmt::format("{}: {} frames, {} of them skipped, {}x{}, extinction {:g} per world unit",
                          options.name(), plan.frames.size(),
                          std::ranges::count_if(plan.frames, &TurntableFrame::skipped), width, height,
-                         *picture.extinction));
+                         extinction));
 }
 
 }  // namespace

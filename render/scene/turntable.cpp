@@ -14,6 +14,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
@@ -74,6 +75,31 @@ Lights Turntable::lights(const Lights& start, double frame) const {
     if (light.cone) light.cone->direction = turned(light.cone->direction, degrees);
   }
   return result;
+}
+
+std::vector<Vec3f> sweptCorners(std::span<const Vec3f> points) {
+  std::vector<Vec3f> sorted(points.begin(), points.end());
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Vec3f& a, const Vec3f& b) { return std::tie(a.y, a.x, a.z) < std::tie(b.y, b.x, b.z); });
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  std::vector<Vec3f> corners;
+  for (std::size_t begin = 0, end = 0; begin != sorted.size(); begin = end) {
+    while (end != sorted.size() && sorted[end].y == sorted[begin].y) ++end;
+    // One side of the hull from the least x to the largest, then the other.
+    for (const int side : {1, -1}) {
+      const std::size_t first = corners.size();
+      for (std::size_t i = begin; i != end; ++i) {
+        const Vec3f& p = sorted[i];
+        const auto turns = [&] {
+          const Vec3d a(corners[corners.size() - 2]), b(corners.back()), c(p);
+          return side * ((b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x)) > 0;
+        };
+        while (corners.size() >= first + 2 && !turns()) corners.pop_back();
+        corners.push_back(p);
+      }
+    }
+  }
+  return corners;
 }
 
 std::vector<Vec3f> sweptOutline(std::span<const Vec3f> points, const Vec3f& middle) {

@@ -50,4 +50,8 @@ class Turntable {
 /// turntable, at one distance for all. Cost: a sort of `points`.
 std::vector<Vec3f> sweptOutline(std::span<const Vec3f> points, const Vec3f& middle);
 
+/// Those of `points` that are corners of the hull of all at their height: they have the same swept outline,
+/// whatever the vertical axis is. Sorted by height. Cost: a sort of `points`.
+std::vector<Vec3f> sweptCorners(std::span<const Vec3f> points);
+
 }  // namespace nephele

@@ -46,11 +46,7 @@ std::string lightKey(const CLI::App& app, const SceneOptions& scene, const Pictu
   ContentHash more;
   if (!picture.volumes.color.empty()) more.add(std::to_string(run.frame().value_or(0)));
   more.add(fmt::format("{} {}", picture.readsCodes(), picture.needsSamples()));
-  if (run.part && run.part->range) {
-    const Extent& range = *run.part->range;
-    more.addNumbers(std::span(&range.box, 1));
-    more.add(fmt::format("{} {}", range.longestSide, range.typicalDensity));
-  }
+  if (run.part && run.part->range) more.add(run.part->range->text());
   return optionsDigest(app, others, more.text(), run.files);
 }
 

@@ -35,16 +35,17 @@ RenderVolume SceneOptions::volume(PictureOptions& picture, Run& run) const {
   return sceneVolume(picture, run).taken();
 }
 
+Extent SceneOptions::measured(const PictureOptions& picture, Run& run) const {
+  if (!isScript(inputs) && areShapes(inputs)) return extentOfShapes(inputs, objects, run);
+  PictureOptions own = picture;
+  const RenderVolume read = volume(own, run);
+  Extent extent = extentOf(read);
+  if (!own.extinction) extent.typicalDensity = read.typicalDensity();
+  return extent;
+}
+
 Extent SceneOptions::extent(const PictureOptions& picture, Run& run) const {
-  Extent extent;
-  if (!isScript(inputs) && areShapes(inputs)) {
-    extent = extentOfShapes(inputs, objects, run);
-  } else {
-    PictureOptions own = picture;
-    const RenderVolume read = volume(own, run);
-    extent = extentOf(read);
-    if (!own.extinction) extent.typicalDensity = read.typicalDensity();
-  }
+  Extent extent = measured(picture, run);
   CameraOptions camera = picture;
   objects.lift(camera);
   extent.outline = camera.outermost(extent.outline);

@@ -46,7 +46,9 @@ struct SceneOptions {
   SceneVolume sceneVolume(PictureOptions& picture, Run& run) const;
   /// For one camera, that of `picture`.
   RenderVolume volume(PictureOptions& picture, Run& run) const;
-  /// How large the inputs are, for sequences: volumes, or shapes alone. @throws Error naming the file.
+  /// How large the inputs are: volumes, or shapes alone. @throws Error naming the file.
+  Extent measured(const PictureOptions& picture, Run& run) const;
+  /// The same for sequences, with what of the outline the camera of `picture` frames.
   Extent extent(const PictureOptions& picture, Run& run) const;
   /// Puts the objects into `picture`, which is resolved and shown on screens, too, or not, and that it is to
   /// have depth. @throws CLI::Error for

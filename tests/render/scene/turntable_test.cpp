@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <tuple>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/scene/environment.h"
@@ -114,6 +116,25 @@ TEST(Turntable, SweptOutlineIsSmallAndHoldsAllTurnedPoints) {
   }
   EXPECT_TRUE(sweptOutline({}, kMiddle).empty());
   EXPECT_EQ(sweptOutline(std::vector<Vec3f>{kMiddle}, kMiddle).size(), 96u);
+}
+
+// Corners at each height are enough, about any axis; those of a box of 5^3 points are 5 times 4.
+TEST(Turntable, SweptCornersHaveTheSameSweptOutline) {
+  const std::vector<Vec3f> all = points(), corners = sweptCorners(all);
+  for (const Vec3f& axis : {kMiddle, Vec3f{}, Vec3f{-7, 1, 3}})
+    EXPECT_EQ(sweptOutline(corners, axis), sweptOutline(all, axis));
+  std::vector<Vec3f> box;
+  for (int i = 0; i != 125; ++i) box.push_back({float(i % 5), float(i / 5 % 5), float(i / 25)});
+  std::vector<Vec3f> ofBox = sweptCorners(box);
+  EXPECT_EQ(sweptOutline(ofBox, {1, 0, 2}), sweptOutline(box, {1, 0, 2}));
+  const std::set<std::tuple<float, float, float>> distinct = [&] {
+    std::set<std::tuple<float, float, float>> result;
+    for (const Vec3f& p : ofBox) result.emplace(p.x, p.y, p.z);
+    return result;
+  }();
+  EXPECT_EQ(distinct.size(), 20u);
+  EXPECT_LE(sweptCorners(ofBox).size(), ofBox.size());
+  EXPECT_TRUE(sweptCorners({}).empty());
 }
 
 TEST(Turntable, AModelThatTurnsSeesCameraAndLightsTurnTheOtherWay) {
