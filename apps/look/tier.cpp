@@ -59,6 +59,8 @@ PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
   PictureStages::Keys keys = plan.keys(tier_);
   const auto reach = reaches_.find(keys.shape + keys.levels + keys.volume);
   if (reach != reaches_.end()) keys.levels += reach->second;
+  if (plan.subject.kind == LookSubject::Kind::script && keys.volume == voxelsKey_)
+    keys.volume += fmt::format("voxels={:g}", voxels_);
   return keys;
 }
 
@@ -99,8 +101,33 @@ std::unique_ptr<LookTier::Growing> LookTier::grown(const LookPlan& plan, Run& ru
   return growing;
 }
 
-std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookTier* finer, Run& run) {
+ScriptVolume& LookTier::script(const LookPlan& plan, Run& run) {
   const std::string key = plan.keys(tier_).volume;
+  if (!script_ || scriptKey_ != key) {
+    script_.reset();
+    PictureOptions picture = plan.picture;
+    script_ = std::make_unique<ScriptVolume>(plan.subject.path, plan.scene.script, picture, run);
+    scriptKey_ = key;
+  }
+  return *script_;
+}
+
+void LookTier::chooseVoxels(const LookPlan& plan, const PictureOptions& picture, bool isFinal,
+                            LookTier* finer, Run& run) {
+  const std::string key = plan.keys(tier_).volume;
+  ScriptVolume& ran = (finer ? finer : this)->script(plan, run);
+  if (key == voxelsKey_ && (finer || !isFinal)) return;
+  const float coarse = ran.box().longestSide() / LookPlan::kCoarseVoxels;
+  voxels_ = finer ? coarse : ran.voxelSizeFor(picture, run).value_or(coarse);
+  voxelsKey_ = key;
+}
+
+std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookTier* finer, Run& run) {
+  const std::string key = keysOf(plan).volume;
+  if (plan.subject.kind == LookSubject::Kind::script) {
+    const ScriptVolume& ran = (finer ? finer : this)->script(plan, run);
+    return stages_.volume(key, [&] { return ran.withVoxels(voxels_, run); });
+  }
   if (plan.growsCloud()) {
     const std::unique_ptr<Growing> growing = grown(plan, run);
     return stages_.volume(key, [&] { return growing->volume(plan, run); });
@@ -145,10 +172,14 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
   // Steps of a cloud are no steps to something else.
   if (plan.growsCloud() != isGrown_) stages_.forget();
   isGrown_ = plan.growsCloud();
-  if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   PictureOptions picture = plan.pictureOf(tier_);
   picture.frame.width = frame.width;
   picture.frame.height = frame.height;
+  if (plan.subject.kind == LookSubject::Kind::script) {
+    chooseVoxels(plan, picture, frame.samples == 0, finer, run);
+    (finer ? finer : this)->script(plan, run).suggestTo(picture);
+  }
+  if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   picture.render.aovs = frame.show.layers();
   std::shared_ptr<const LitCloud> lit;
   if (isLit(plan)) {

@@ -38,6 +38,12 @@ class LookTier {
     RenderVolume volume(const LookPlan& plan, Run& run);
   };
   std::unique_ptr<Growing> grown(const LookPlan& plan, Run& run);
+  /// A script that has been run, kept until it or its parameters change.
+  ScriptVolume& script(const LookPlan& plan, Run& run);
+  /// Chooses the voxels of a script: those that `picture` asks for, or those that there are, where that is
+  /// enough or there is a coarser way.
+  void chooseVoxels(const LookPlan& plan, const PictureOptions& picture, bool isFinal, LookTier* finer,
+                    Run& run);
   std::shared_ptr<const RenderVolume> volume(const LookPlan& plan, LookTier* finer, Run& run);
   /// What is shown as a surface.
   std::shared_ptr<const Mesh> surface(const LookPlan& plan, LookTier* finer, Run& run);
@@ -49,6 +55,10 @@ class LookTier {
   LookPlan::Tier tier_;
   PictureStages stages_;
   Stage<LookSurfaces> surface_;
+  std::unique_ptr<ScriptVolume> script_;
+  // Of the script, and of its voxels, which depend on the camera.
+  std::string scriptKey_, voxelsKey_;
+  float voxels_ = 0;
   // Whether the stages are those of a cloud that is grown.
   bool isGrown_ = false;
   // How far layers reach, by the keys of shape, layers and volume.

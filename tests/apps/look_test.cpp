@@ -404,6 +404,43 @@ Json shown(Json body, const std::string& what) {
   return body;
 }
 
+TEST(LookVerb, SamplesAScriptForTheCameraThatRests) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.file("s.felt")) << "scalarfield density = clamp(sphere((0, 0, 0), 1) * 20, 0, 1);\n"
+                                          "vector sun = (0, 80, 3);\n";
+  const Viewer viewer({folder.file("s.felt"), "--quality", "draft"});
+  const auto from = [](int revision, const std::string& z) {
+    return settings(revision, Json::object(),
+                    {{"quality", "draft"}, {"camera-position", "0,0," + z}, {"look-at", "0,0,0"}});
+  };
+  const Json far = pictureOf(viewer, from(1, "12"));
+  ASSERT_EQ(far["type"], "picture") << far;
+  // What the script says of the picture, as `render` takes it.
+  EXPECT_NEAR(far["sun"][1].get<double>(), 80, 1e-3);
+  // Where it is dragged, the voxels stay.
+  Json dragged = from(2, "4");
+  dragged["hurry"] = true;
+  const auto all = viewer.messages(
+      "a", [&] { EXPECT_EQ(viewer.post("settings", dragged)->status, 200); },
+      [](const Json& message) { return message["type"] == "picture" || message["type"] == "error"; });
+  ASSERT_EQ(all.back()["type"], "picture") << all.back();
+  EXPECT_EQ(all.back()["voxels"], far["voxels"]);
+  // A third of the distance to the middle, and a quarter and less to the nearest of it.
+  const Json near = pictureOf(viewer, from(3, "4"));
+  ASSERT_EQ(near["type"], "picture") << near;
+  EXPECT_GT(near["voxels"].get<double>(), 2.5 * far["voxels"].get<double>());
+  // As finely as `render` does.
+  const auto rendered =
+      test::runProgram("render " + folder.file("s.felt") +
+                       " --camera-position=0,0,4 --look-at=0,0,0 --size 64x36 --quality draft "
+                       "--preview " +
+                       folder.file("x.png") + " --stats " + folder.file("x.json"));
+  ASSERT_EQ(rendered.exitCode, 0) << rendered.errors;
+  const double voxel = Json::parse(test::textOf(folder.file("x.json")))["script"]["voxel_size"];
+  const double side = near["bounds"][1][0].get<double>() - near["bounds"][0][0].get<double>();
+  EXPECT_NEAR(side / voxel, near["voxels"].get<double>(), 1e-3 * side / voxel);
+}
+
 TEST(LookVerb, ShowsThePiecesOfACut) {
   const test::TemporaryFolder folder;
   const Viewer viewer({test::ownData("data/cloud_base.obj"), "--show", "pieces", "--plane=0,0.5,0,0,1,0",

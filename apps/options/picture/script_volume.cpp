@@ -104,8 +104,8 @@ ScriptScene runScript(const std::string& path, const ScriptOptions& options, con
   return scene;
 }
 
-/// Takes what the script says of the picture where the command line does not.
-void suggest(const std::string& path, const ScriptScene& scene, PictureOptions& picture) {
+/// Refuses what a script cannot say of a picture.
+void check(const std::string& path, const ScriptScene& scene) {
   constexpr double kMost = 1e9;
   const auto isWithin = [](double x, double least, double most) { return x >= least && x <= most; };
   if (scene.extinction && !isWithin(*scene.extinction, 0, kMost))
@@ -120,9 +120,6 @@ void suggest(const std::string& path, const ScriptScene& scene, PictureOptions& 
         fmt::format("{}: 'sun' is ({:g}, {:g}, {:g}), allowed: an azimuth, an elevation from -90 to 90, "
                     "and an irradiance from 0 to 1e9",
                     path, scene.sun->x, scene.sun->y, scene.sun->z));
-  if (scene.extinction && !picture.extinction) picture.extinction = float(*scene.extinction);
-  if (scene.sky) picture.light.suggestSky(felt::toFloat(*scene.sky));
-  if (scene.sun) picture.light.suggestSun(scene.sun->x, scene.sun->y, scene.sun->z);
 }
 
 }  // namespace
@@ -152,7 +149,11 @@ ScriptVolume::ScriptVolume(const std::string& path, const ScriptOptions& options
                            Run& run)
     : path_(path), isExact_(options.detail == ScriptOptions::Detail::exact) {
   ScriptScene scene = runScript(path, options, picture, run);
-  suggest(path, scene, picture);
+  check(path, scene);
+  extinction_ = scene.extinction;
+  sky_ = scene.sky;
+  sun_ = scene.sun;
+  suggestTo(picture);
   parts_ = std::move(scene.parts);
   if (isExact_ && (parts_.emission || parts_.velocity || parts_.temperature))
     throw Error(path +
@@ -160,26 +161,42 @@ ScriptVolume::ScriptVolume(const std::string& path, const ScriptOptions& options
                 "--detail camera shows them");
 }
 
+void ScriptVolume::suggestTo(PictureOptions& picture) const {
+  if (extinction_ && !picture.extinction) picture.extinction = float(*extinction_);
+  if (sky_) picture.light.suggestSky(felt::toFloat(*sky_));
+  if (sun_) picture.light.suggestSun(sun_->x, sun_->y, sun_->z);
+}
+
 RenderVolume ScriptVolume::forCameraOf(const PictureOptions& picture, Run& run) {
-  return namingFile(path_, [&] {
-    // What the camera frames shows only once the script has been looked at.
-    const float side = parts_.box.longestSide();
-    const RenderVolume coarse =
-        sampledVolume({.density = parts_.density, .box = parts_.box}, side / kCoarse, run);
-    if (coarse.isEmpty()) return coarse;
-    const bool hasOthers = parts_.colour || parts_.emission || parts_.velocity || parts_.temperature;
-    const double bytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes);
-    resolution_.emplace(parts_.density,
-                        FieldVolumeOptions{.box = parts_.box,
-                                           .voxelsPerPixel = isExact_ ? 0.5f : 1.0f,
-                                           .mostBytes = hasOthers ? bytes / 4 : bytes,
-                                           .sizesPerOctave = kSizesPerOctave},
-                        run);
-    const Camera camera = static_cast<const CameraOptions&>(picture).placed(extentOf(coarse), run).camera();
-    const float size = voxelSize(camera, run);
-    run.detail(fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path_, size, side / size));
-    run.stats["script"] = {{"voxel_size", size}, {"exact", isExact_}};
-    return withVoxels(size, run);
+  const std::optional<float> size = voxelSizeFor(picture, run);
+  if (!size) return sampledVolume({.density = parts_.density, .box = parts_.box}, coarseVoxels(), run);
+  const float side = parts_.box.longestSide();
+  run.detail(fmt::format("{}: voxels of {:g}, {:.0f} along the longest side", path_, *size, side / *size));
+  run.stats["script"] = {{"voxel_size", *size}, {"exact", isExact_}};
+  return withVoxels(*size, run);
+}
+
+float ScriptVolume::coarseVoxels() const {
+  return parts_.box.longestSide() / kCoarse;
+}
+
+std::optional<float> ScriptVolume::voxelSizeFor(const PictureOptions& picture, Run& run) {
+  return namingFile(path_, [&]() -> std::optional<float> {
+    if (!seen_) {
+      // What the camera frames shows only once the script has been looked at.
+      seen_ = extentOf(sampledVolume({.density = parts_.density, .box = parts_.box}, coarseVoxels(), run));
+      const bool hasOthers = parts_.colour || parts_.emission || parts_.velocity || parts_.temperature;
+      const double bytes = std::min(kMostBytes, kMemoryShare * run.memoryLimitBytes);
+      if (!seen_->box.isEmpty())
+        resolution_.emplace(parts_.density,
+                            FieldVolumeOptions{.box = parts_.box,
+                                               .voxelsPerPixel = isExact_ ? 0.5f : 1.0f,
+                                               .mostBytes = hasOthers ? bytes / 4 : bytes,
+                                               .sizesPerOctave = kSizesPerOctave},
+                            run);
+    }
+    if (seen_->box.isEmpty()) return std::nullopt;
+    return voxelSize(static_cast<const CameraOptions&>(picture).placed(*seen_, run).camera(), run);
   });
 }
 

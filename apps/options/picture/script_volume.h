@@ -44,15 +44,21 @@ bool isScript(const std::vector<std::string>& paths);
 ///
 class ScriptVolume {
  public:
-  /// Runs the script; what it says of the picture goes into `picture`. `time` is the frame, `seed` that of
-  /// the picture. @throws felt::ScriptError; Error naming the file where it declares no density, or one that
-  /// ends nowhere.
+  /// Runs the script; what it says of the picture goes into `picture`, see suggestTo. `time` is the frame,
+  /// `seed` that of the picture. @throws felt::ScriptError; Error naming the file where it declares no
+  /// density, or one that ends nowhere.
   ScriptVolume(const std::string& path, const ScriptOptions& options, PictureOptions& picture, Run& run);
 
   /// Whether voxels stand between the script and the picture.
   bool isSampled() const { return !isExact_; }
+  /// What the script says of a picture, where its options do not.
+  void suggestTo(PictureOptions& picture) const;
+  /// Where there may be density.
+  const Box& box() const { return parts_.box; }
   /// As it is to be seen through the camera of `picture`.
   RenderVolume forCameraOf(const PictureOptions& picture, Run& run);
+  /// The voxels of that; nothing where the script is empty. Looks at the script coarsely at the first call.
+  std::optional<float> voxelSizeFor(const PictureOptions& picture, Run& run);
   /// The voxels that `camera` asks for: as wide as a pixel, or up to 9 % less, so that cameras that see it
   /// from about as far away share them.
   float voxelSize(const Camera& camera, const Progress& progress);
@@ -60,9 +66,16 @@ class ScriptVolume {
   RenderVolume withVoxels(float voxelSize, const Progress& progress) const;
 
  private:
+  /// Those in which it is looked at to frame it.
+  float coarseVoxels() const;
+
   std::string path_;
   FieldParts parts_;
   bool isExact_;
+  std::optional<double> extinction_;
+  std::optional<Vec3d> sky_, sun_;
+  /// What is seen of it from anywhere, once that is known.
+  std::optional<Extent> seen_;
   std::optional<FieldResolution> resolution_;
 };
 
