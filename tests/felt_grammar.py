@@ -115,7 +115,8 @@ def main(tokens_program, grammar_path, *paths):
                 faults += faults_of(name, script, tokens_program, grammar)
     names = [rule["name"] for top in json.load(open(grammar_path))["patterns"] for rule in [top, *top.get("patterns", [])]]
     faults += [f"no script has anything of the rule {name}" for name in names if name not in grammar.used]
-    print("\n".join(faults))
+    for fault in faults:
+        print(fault)
     return 1 if faults else 0
 
 

@@ -51,16 +51,8 @@ std::string literal(const Amount& amount, Quantity::Unit unit) {
   return literal(amount.value) + mark;
 }
 
-std::string quotedLiteral(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    if (c == '\n')
-      result += "\\n";
-    else
-      result += c;
-  }
-  return result + "\"";
+std::string literal(const std::string& text) {
+  return felt::literalText(text, {felt::Kind::text});
 }
 
 std::string vectorLiteral(const Vec3f& v) {
@@ -201,7 +193,7 @@ class Parser {
     if (!isVolumeFile(path) || rest.find(':') == std::string::npos)
       refuse(fmt::format("mask:FILE.vdb:{0},{0} or mask:FILE.vdb:GRID:{0},{0}", value_.quantity.word()));
     value_.files.push_back(path);
-    return ramp(fmt::format("mask({}, {})", quotedLiteral(path), quotedLiteral(grid)), two(values));
+    return ramp(fmt::format("mask({}, {})", literal(path), literal(grid)), two(values));
   }
 
   std::string attribute(const std::string& rest) const {
@@ -212,7 +204,7 @@ class Parser {
     if (hasSpheres) name = before;
     if (name.empty() || rest.find(':') == std::string::npos)
       refuse(fmt::format("attribute:NAME:{0},{0} or attribute:NAME:spheres:{0},{0}", value_.quantity.word()));
-    return ramp(fmt::format("attribute({}{})", quotedLiteral(name), hasSpheres ? ", \"spheres\"" : ""),
+    return ramp(fmt::format("attribute({}{})", literal(name), hasSpheres ? ", \"spheres\"" : ""),
                 two(values));
   }
 

@@ -22,8 +22,8 @@ bool areOneFile(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-void requireWritable(const Context& context, const std::string& path,
-                     std::initializer_list<const char*> endings) {
+std::string requireWritable(const Context& context, const std::string& path,
+                            std::initializer_list<const char*> endings) {
   std::string ending = fs::path(path).extension().string(), list;
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
@@ -35,6 +35,7 @@ void requireWritable(const Context& context, const std::string& path,
       throw CallError(Code::failed, fmt::format("\"{}\" is a file that the script has read", path),
                       "write to another file: what was read stays as it is");
   const OutputFile probe(path);
+  return ending;
 }
 
 }  // namespace nephele::felt

@@ -9,9 +9,10 @@ namespace nephele::felt {
 
 /// Says before the work begins what could not be written at its end. `endings` end what is allowed, as
 /// ".vdb", in any case.
+/// Returns the one of `endings` that the name has.
 /// @throws CallError if the name ends otherwise, or the script has read the file; Error if its folder cannot
 /// be written to.
-void requireWritable(const Context& context, const std::string& path,
-                     std::initializer_list<const char*> endings);
+std::string requireWritable(const Context& context, const std::string& path,
+                            std::initializer_list<const char*> endings);
 
 }  // namespace nephele::felt

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "nephele/modeling/base/math.h"
 #include "nephele/modeling/felt/diagnostic.h"
 
 /// Arguments of scripts as those of the library, checked on the way.
@@ -31,6 +32,11 @@ inline float finite(const char* parameter, double value) {
   if (!std::isfinite(result))
     throw CallError(Code::outOfRange, std::string(parameter) + " must be finite and below 3.4e38");
   return result;
+}
+
+/// The same of a place or a direction.
+inline Vec3f finite(const char* parameter, const Vec3d& value) {
+  return {finite(parameter, value.x), finite(parameter, value.y), finite(parameter, value.z)};
 }
 
 /// The same. @throws CallError naming the parameter unless it is positive and finite.

@@ -312,7 +312,7 @@ Named Session::enter(const std::string& text) {
     parts_->checker.checkExpression(expression, {}, diagnostics);
     if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), sources);
     return tellingFaults(sources, [&] {
-      parts_->interpreter.run({});
+      parts_->interpreter.begin();
       return Named{"", expression->type, parts_->interpreter.evaluate(*expression)};
     });
   }

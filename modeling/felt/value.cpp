@@ -12,6 +12,9 @@ namespace nephele::felt {
 
 namespace {
 
+/// Numbers of samples beside the last cell are ints, too.
+constexpr double kMostCells = 2.1e9;
+
 bool isFinite(const Vec3d& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
@@ -31,7 +34,7 @@ std::string numberLiteral(double value) {
   return result;
 }
 
-std::string quoted(const std::string& text) {
+std::string textLiteral(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') result += '\\';
@@ -115,10 +118,9 @@ void requireValid(const Domain& domain) {
                                         threeText(domain.lengths, numberShown));
   require(positive(domain.cell), "the cells of a domain must be finite and longer than 0, not " +
                                      threeText(domain.cell, numberShown));
-  const double cells = std::ceil(domain.lengths.x / domain.cell.x) *
-                       std::ceil(domain.lengths.y / domain.cell.y) *
-                       std::ceil(domain.lengths.z / domain.cell.z);
-  require(cells <= 2147483648.0, "a domain may have 2.1e+09 cells at most, not " + numberShown(cells));
+  double cells = 1;
+  for (int axis = 0; axis < 3; ++axis) cells *= std::ceil(domain.lengths[axis] / domain.cell[axis]);
+  require(cells <= kMostCells, "a domain may have 2.1e+09 cells at most, not " + numberShown(cells));
 }
 
 Value converted(const Value& value, const Type& to) {
@@ -191,7 +193,7 @@ std::string literalText(const Value& value, const Type& type) {
     case Kind::boolean:
       return value.as<bool>() ? "true" : "false";
     case Kind::text:
-      return quoted(value.as<std::string>());
+      return textLiteral(value.as<std::string>());
     case Kind::vector:
       return threeText(value.as<Vec3d>(), numberLiteral);
     case Kind::matrix:

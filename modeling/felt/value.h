@@ -35,7 +35,7 @@ struct Domain {
 };
 
 /// Throws unless origin and rotation are finite, lengths and cells finite and positive, and there are at most
-/// 2^31 cells. @throws Error
+/// 2.1e9 cells. @throws Error
 void requireValid(const Domain& domain);
 
 /// Room for the samples of a field on a domain. Whoever holds it sees what was written last.

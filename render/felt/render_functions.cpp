@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "nephele/levelset/felt/domain_samples.h"
 #include "nephele/levelset/felt/field_extent.h"
@@ -27,10 +26,6 @@ using V = VectorField;
 constexpr double kMemoryShare = 0.25, kMostBytes = 4e9;
 constexpr int kMostPixels = 16384;
 
-Vec3f placeOf(const char* parameter, const Vec3d& place) {
-  return {finite(parameter, place.x), finite(parameter, place.y), finite(parameter, place.z)};
-}
-
 Camera cameraOf(const Vec3d& camera, const Vec3d& lookat, double fov, std::int64_t width,
                 std::int64_t height) {
   if (!(fov >= 0.01 && fov <= 179))
@@ -38,7 +33,7 @@ Camera cameraOf(const Vec3d& camera, const Vec3d& lookat, double fov, std::int64
   Camera::Frame frame{.width = inRange("width", width, 1, kMostPixels),
                       .height = inRange("height", height, 1, kMostPixels),
                       .fovDegrees = float(fov)};
-  const Vec3f from = placeOf("camera", camera), to = placeOf("lookat", lookat);
+  const Vec3f from = finite("camera", camera), to = finite("lookat", lookat);
   const Vec3f way = to - from;
   // Straight up or down the picture's top is where -z is.
   const bool isUpright = std::max(std::abs(way.x), std::abs(way.z)) <= 1e-4f * std::abs(way.y);
@@ -47,8 +42,8 @@ Camera cameraOf(const Vec3d& camera, const Vec3d& lookat, double fov, std::int64
 
 Lights lightsOf(const Vec3d& sun, const Vec3d& sky) {
   Lights lights;
-  lights.sky = placeOf("sky", sky);
-  const Vec3f said = placeOf("sun", sun);
+  lights.sky = finite("sky", sky);
+  const Vec3f said = finite("sun", sun);
   if (!(said.y >= -90 && said.y <= 90 && said.z >= 0))
     throw CallError(
         Code::outOfRange,
@@ -71,20 +66,24 @@ bool isOnly(const V& field, float number, const Box& box) {
   return true;
 }
 
-void requirePicture(const Context& context, const std::string& path) {
-  requireWritable(context, path, {".exr", ".png"});
-}
+/// The file that a picture goes into, of which is known that it can be written.
+struct PictureFile {
+  PictureFile(const Context& context, const std::string& path_)
+      : path(path_), isForScreens(requireWritable(context, path, {".exr", ".png"}) == ".png") {}
 
-void writePicture(const std::string& path, const Image& image, const Camera& camera, const Vec3f& sky) {
-  const std::map<std::string, std::string> metadata{{"creator", "nephele"}};
-  std::string ending = std::filesystem::path(path).extension().string();
-  if (ending == ".png" || ending == ".PNG")
-    writePng(path, image, {.background = sky, .curve = ViewCurve::filmic}, metadata);
-  else
-    writeExr(path, image, camera, metadata);
-}
+  void write(const Image& image, const Camera& camera, const Vec3f& sky) const {
+    const std::map<std::string, std::string> metadata{{"creator", "nephele"}};
+    if (isForScreens)
+      writePng(path, image, {.background = sky, .curve = ViewCurve::filmic}, metadata);
+    else
+      writeExr(path, image, camera, metadata);
+  }
 
-void render(Context& context, const std::string& path, const S& density, const Box& box, const Camera& camera,
+  std::string path;
+  bool isForScreens;
+};
+
+void render(Context& context, const PictureFile& file, const S& density, const Box& box, const Camera& camera,
             double extinction, const V& color, const V& emission, const Lights& lights,
             std::int64_t samples) {
   if (!(extinction >= 0 && extinction <= 1e9))
@@ -107,7 +106,7 @@ void render(Context& context, const std::string& path, const S& density, const B
   requireBytes(double(volume.memoryBytes()) + estimateRenderBytes(volume, lights, camera, options),
                "the picture", "make it smaller", context);
   const RenderResult result = renderImage(volume, medium, lights, camera, options, progress);
-  writePicture(path, result.image, camera, lights.sky);
+  file.write(result.image, camera, lights.sky);
 }
 
 }  // namespace
@@ -130,8 +129,8 @@ void addRenderFunctions(Registry& r) {
         [](Context& context, const std::string& path, const S& density, const Vec3d& camera,
            const Vec3d& lookat, double fov, std::int64_t width, std::int64_t height, double extinction,
            const V& color, const V& emission, const Vec3d& sun, const Vec3d& sky, std::int64_t samples) {
-          requirePicture(context, path);
-          render(context, path, density, extentOf(density, *context.progress),
+          const PictureFile file(context, path);
+          render(context, file, density, extentOf(density, *context.progress),
                  cameraOf(camera, lookat, fov, width, height), extinction, color, emission,
                  lightsOf(sun, sky), samples);
         });
@@ -143,9 +142,9 @@ void addRenderFunctions(Registry& r) {
       [](Context& context, const std::string& path, const S& density, const Domain& box, const Vec3d& camera,
          const Vec3d& lookat, double fov, std::int64_t width, std::int64_t height, double extinction,
          const V& color, const V& emission, const Vec3d& sun, const Vec3d& sky, std::int64_t samples) {
-        requirePicture(context, path);
+        const PictureFile file(context, path);
         requireValid(box);
-        render(context, path, density, box.bounds(), cameraOf(camera, lookat, fov, width, height), extinction,
+        render(context, file, density, box.bounds(), cameraOf(camera, lookat, fov, width, height), extinction,
                color, emission, lightsOf(sun, sky), samples);
       });
 }

@@ -18,6 +18,7 @@
 
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/octant.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 #include "nephele/render/volume/field_density.h"
@@ -31,17 +32,6 @@ constexpr int kLevels = 6;
 constexpr float kFinest = 1e-5f;
 // Along the box at most, of what changes slowly.
 constexpr float kVelocityVoxels = 128;
-
-Box octant(const Box& box, int index) {
-  const Vec3f middle = (box.min + box.max) * 0.5f;
-  Box part;
-  for (int axis = 0; axis != 3; ++axis) {
-    const bool upper = index >> axis & 1;
-    part.min[axis] = upper ? middle[axis] : box.min[axis];
-    part.max[axis] = upper ? box.max[axis] : middle[axis];
-  }
-  return part;
-}
 
 // The smallest width that a pixel has in the part of `box` that the picture may show; infinite where it shows
 // none of it.

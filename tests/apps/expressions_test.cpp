@@ -27,6 +27,21 @@ void writeScript(const std::string& path, const std::string& text) {
   std::ofstream(path) << text;
 }
 
+/// What render makes of an input, into the folder.
+Image seen(const TemporaryFolder& folder, const std::string& input, const std::string& options) {
+  const std::string path = folder.file("seen.exr");
+  const ProgramResult result =
+      runProgram("render " + input + " -o " + path + " --no-backdrop --quiet " + options);
+  EXPECT_EQ(result.exitCode, 0) << options << "\n" << result.errors;
+  return readImage(path);
+}
+
+double sumOf(const Image& image, const std::string& channel) {
+  double sum = 0;
+  for (const float value : image.channel(channel).values) sum += double(value);
+  return sum;
+}
+
 // Short forms are short for expressions, so that both make the same voxels bit for bit.
 TEST(Expressions, AreWhatShortFormsAreShortFor) {
   const TemporaryFolder folder;
@@ -127,13 +142,8 @@ TEST(Scripts, AreLookedAt) {
   EXPECT_NE(result.errors.find("time 0"), std::string::npos) << result.errors;
   EXPECT_NE(result.output.find("extinction 3 per world unit"), std::string::npos) << result.output;
   const Image image = readImage(picture);
-  const auto sum = [&](const char* name) {
-    double total = 0;
-    for (const float value : image.find(name)->values) total += double(value);
-    return total;
-  };
-  EXPECT_GT(sum("R"), 1.5 * sum("B"));
-  EXPECT_GT(sum("A"), 100);
+  EXPECT_GT(sumOf(image, "R"), 1.5 * sumOf(image, "B"));
+  EXPECT_GT(sumOf(image, "A"), 100);
 
   EXPECT_EQ(runProgram(command + " --set radius=4").exitCode, 2);
   EXPECT_EQ(runProgram(command + " --set radios=1").exitCode, 2);
@@ -144,15 +154,9 @@ TEST(Expressions, ColourVolumes) {
   const TemporaryFolder folder;
   grown(folder, "");
   const auto picture = [&](const std::string& options) {
-    const ProgramResult result =
-        runProgram("render " + folder.file("cloud.vdb") + " -o " + folder.file("p.exr") +
-                   " --size 48x32 --samples 1 --no-backdrop --sky 1,1,1 --sun none " + options);
-    EXPECT_EQ(result.exitCode, 0) << result.errors;
-    const Image image = readImage(folder.file("p.exr"));
-    std::array<double, 3> sums{};
-    for (std::size_t c = 0; c < 3; ++c)
-      for (const float value : image.find(std::string(1, "RGB"[c]))->values) sums[c] += double(value);
-    return sums;
+    const Image image =
+        seen(folder, folder.file("cloud.vdb"), "--size 48x32 --samples 1 --sky 1,1,1 --sun none " + options);
+    return std::array{sumOf(image, "R"), sumOf(image, "G"), sumOf(image, "B")};
   };
   const auto white = picture(""), red = picture("--color '=(1, 0.6, 0.2)'");
   EXPECT_NEAR(red[0], white[0], 0.01 * white[0]);
@@ -174,12 +178,8 @@ TEST(Scripts, LookTheSameWithAndWithoutAGrid) {
   const std::string script = folder.file("ball.felt");
   const auto picture = [&](const std::string& text, const std::string& detail) {
     writeScript(script, "scalarfield density = mask(sphere((0,0,0), 1) + 0.1 * perlin(3), 0.2);\n" + text);
-    const std::string path = folder.file(detail + ".exr");
-    const ProgramResult result = runProgram(
-        "render " + script + " -o " + path +
-        " --size 64x48 --samples 4 --no-backdrop --camera-position 0,0,5 --look-at 0,0,0 --detail " + detail);
-    EXPECT_EQ(result.exitCode, 0) << result.errors;
-    return readImage(path);
+    return seen(folder, script,
+                "--size 64x48 --samples 4 --camera-position 0,0,5 --look-at 0,0,0 --detail " + detail);
   };
   const auto expectTheSame = [](const Image& camera, const Image& exact, const char* channel) {
     const std::vector<float>&a = camera.find(channel)->values, &b = exact.find(channel)->values;
@@ -211,17 +211,12 @@ TEST(Scripts, LookTheSameWithAndWithoutAGrid) {
 // once.
 TEST(Scripts, SayWhatTheyAreLitBy) {
   const TemporaryFolder folder;
-  const std::string script = folder.file("s.felt"), picture = folder.file("s.exr");
+  const std::string script = folder.file("s.felt");
   const auto brightness = [&](const std::string& lights, const std::string& options) {
     writeScript(script,
                 "scalarfield density = mask(sphere((0,0,0), 1), 0.2);\nfloat extinction = 2;\n" + lights);
-    const ProgramResult result =
-        runProgram("render " + script + " -o " + picture +
-                   " --size 33x33 --no-backdrop --albedo 1,1,1 --octaves 1 --view 0,0 " + options);
-    EXPECT_EQ(result.exitCode, 0) << result.errors;
-    const Image image = readImage(picture);
-    const std::size_t middle = 16 * 33 + 16;
-    return image.find("G")->values[middle] / image.find("A")->values[middle];
+    const Image image = seen(folder, script, "--size 33x33 --albedo 1,1,1 --octaves 1 --view 0,0 " + options);
+    return image.at("G", 16, 16) / image.at("A", 16, 16);
   };
   const std::string sky = "vector sky = (0, 0.5, 0);\n", noSun = "vector sun = (0, 0, 0);\n";
   const float dark = brightness(sky + noSun, "");

@@ -10,14 +10,6 @@ void write(const Context& context, Cache<T>& cache, const Field<T>& field) {
   cache.values = sampled(field, cache.domain, context);
 }
 
-template <class T>
-Field<T> samplesOf(const Cache<T>& cache) {
-  if (!cache.values)
-    throw CallError(Code::noValue, "nothing has been written to this cache yet",
-                    "cachewrite(cache, field) fills it");
-  return *cache.values;
-}
-
 /// What there is of all three kinds of caches.
 template <class T>
 void addOfKind(Registry& r, const std::string& kind, const std::string& field) {

@@ -44,7 +44,7 @@ V readVectorField(Context& context, const std::string& path, const std::string& 
 }
 
 /// The samples of a domain and nothing else.
-BakeOptions samplesOf(const Domain& domain) {
+BakeOptions bakingOf(const Domain& domain) {
   const auto cells = domain.cells();
   return {.voxelSize = 1,
           .box = {{0.5f, 0.5f, 0.5f}, {float(cells.x) - 0.5f, float(cells.y) - 0.5f, float(cells.z) - 0.5f}}};
@@ -59,7 +59,7 @@ void writeField(const Context& context, const std::string& path, const S& f, con
   constexpr float kHalfWidth = 3;
   requireWritable(context, path, {".vdb"});
   requireRoom(domain, 1, context);
-  BakeOptions options = samplesOf(domain);
+  BakeOptions options = bakingOf(domain);
   VdbGridLabel label{name};
   if (name == "surface") {
     if (domain.cell.x != domain.cell.y || domain.cell.x != domain.cell.z)
@@ -82,22 +82,13 @@ void writeField(const Context& context, const std::string& path, const V& f, con
   requireWritable(context, path, {".vdb"});
   requireRoom(domain, 3, context);
   const Affine toWorld = sampleToWorld(domain);
-  VectorGrids grids = gridsOf(bake(transformed(f, inverse(toWorld)), samplesOf(domain), *context.progress));
+  VectorGrids grids = gridsOf(bake(transformed(f, inverse(toWorld)), bakingOf(domain), *context.progress));
   for (auto& grid : grids) {
     auto placed = std::make_shared<BrickGrid>(*grid);
     placed->setLattice(Lattice::of(toWorld));
     grid = std::move(placed);
   }
   writeGrid(path, toVdb(grids, VdbGridLabel{name}));
-}
-
-template <class T>
-void writeCache(const Context& context, const std::string& path, const Cache<T>& cache,
-                const std::string& name) {
-  if (!cache.values)
-    throw CallError(Code::noValue, "nothing has been written to this cache yet",
-                    "cachewrite(cache, field) fills it");
-  writeField(context, path, *cache.values, cache.domain, name);
 }
 
 void addReading(Registry& r) {
@@ -150,13 +141,13 @@ void addWriting(Registry& r) {
         "scalarcache c(domain((-1,-1,-1), (2,2,2), 0.1));\ncachewrite(c, mask(sphere((0,0,0), 0.8)));\n"
         "write(\"fog.vdb\", c);",
         [](Context& context, const std::string& path, const std::shared_ptr<Cache<float>>& cache,
-           const std::string& name) { writeCache(context, path, *cache, name); });
+           const std::string& name) { writeField(context, path, samplesOf(*cache), cache->domain, name); });
   r.add("void write(string path, vectorcache cache, string name = \"v\")",
         "Writes what a cache holds as .vdb.",
         "vectorcache c(domain((-1,-1,-1), (2,2,2), 0.1));\ncachewrite(c, curlnoise());\nwrite(\"wind.vdb\", "
         "c);",
         [](Context& context, const std::string& path, const std::shared_ptr<Cache<Vec3f>>& cache,
-           const std::string& name) { writeCache(context, path, *cache, name); });
+           const std::string& name) { writeField(context, path, samplesOf(*cache), cache->domain, name); });
 }
 
 }  // namespace

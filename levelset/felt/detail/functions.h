@@ -11,6 +11,15 @@ void addMeshFunctions(Registry& registry);
 void addFileFunctions(Registry& registry);
 void addGriddedCloudFunctions(Registry& registry);
 
+/// What was written to a cache last. @throws CallError if nothing was.
+template <class T>
+const Field<T>& samplesOf(const Cache<T>& cache) {
+  if (!cache.values)
+    throw CallError(Code::noValue, "nothing has been written to this cache yet",
+                    "cachewrite(cache, field) fills it");
+  return *cache.values;
+}
+
 /// The closed mesh of triangles that a shape stands for, repaired as far as that goes; what was done is told
 /// as notes. @throws Error as `repairMesh`; Cancelled.
 Mesh solidOf(const Shape& shape, const Context& context);

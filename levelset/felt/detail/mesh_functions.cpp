@@ -13,6 +13,7 @@
 #include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/base/octant.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
@@ -68,13 +69,9 @@ double unsettledShare(const S& level, const Box& box, const Interval& band, int 
   if (range.min > band.max || range.max < band.min) return 0;
   if (splits == 0) return 1;
   const S local = level.restrictedTo(box);
-  const Vec3f middle = box.center();
   double share = 0;
-  for (int part = 0; part < 8; ++part) {
-    Box octant = box;
-    for (int axis = 0; axis < 3; ++axis) (part >> axis & 1 ? octant.min : octant.max)[axis] = middle[axis];
-    share += unsettledShare(local, octant, band, splits - 1) / 8;
-  }
+  for (int part = 0; part < 8; ++part)
+    share += unsettledShare(local, octant(box, part), band, splits - 1) / 8;
   return share;
 }
 

@@ -5,6 +5,7 @@
 
 #include "nephele/levelset/felt/detail/functions.h"
 #include "nephele/levelset/felt/field_extent.h"
+#include "nephele/modeling/base/octant.h"
 #include "nephele/modeling/field/field.h"
 
 namespace nephele::felt {
@@ -20,13 +21,9 @@ Box maybeInside(const ScalarField& level, const Box& box, int splits, const Prog
   if (splits == 0 || range.min > 0) return box;
   progress.check();
   const ScalarField local = level.restrictedTo(box);
-  const Vec3f half = box.center();
   Box found;
-  for (int part = 0; part < 8; ++part) {
-    Box octant = box;
-    for (int axis = 0; axis < 3; ++axis) (part >> axis & 1 ? octant.min : octant.max)[axis] = half[axis];
-    found = found.including(maybeInside(local, octant, splits - 1, progress));
-  }
+  for (int part = 0; part < 8; ++part)
+    found = found.including(maybeInside(local, octant(box, part), splits - 1, progress));
   return found;
 }
 

@@ -17,11 +17,6 @@ Integer sum(Integer a, Integer b) {
   if (__builtin_add_overflow(a, b, &result)) overflow();
   return result;
 }
-Integer difference(Integer a, Integer b) {
-  Integer result;
-  if (__builtin_sub_overflow(a, b, &result)) overflow();
-  return result;
-}
 Integer product(Integer a, Integer b) {
   Integer result;
   if (__builtin_mul_overflow(a, b, &result)) overflow();
@@ -92,7 +87,7 @@ void addNumbers(Registry& r) {
         });
   r.add("float operator^(float a, float b)",
         "`a` to the power `b`, which binds tighter than a sign: -2^2 is -4.", "print(2 ^ 0.5);",
-        [](double a, double b) { return std::pow(a, b); });
+        [](double a, double b) { return power(a, b); });
   r.add("float operator-(float a)", "The opposite.", "print(-1.5);", [](double a) { return -a; });
 }
 
@@ -157,6 +152,22 @@ void addMatrices(Registry& r) {
 }
 
 }  // namespace
+
+std::int64_t difference(std::int64_t a, std::int64_t b) {
+  Integer result;
+  if (__builtin_sub_overflow(a, b, &result)) overflow();
+  return result;
+}
+
+double power(double a, double b) {
+  requireDivisor(a == 0 && b < 0);
+  const double result = std::pow(a, b);
+  if (std::isnan(result) && !std::isnan(a) && !std::isnan(b))
+    throw CallError(Code::outOfRange,
+                    shown(a, {Kind::number}) + " to the power " + shown(b, {Kind::number}) + " is no number",
+                    "of what is negative there are whole powers only");
+  return result;
+}
 
 void addArithmetic(Registry& r) {
   r.group("operators");

@@ -59,12 +59,13 @@ void Interpreter::fail(Code code, const Span& span, std::string message, std::st
   throw RunFault{{code, span, std::move(message), std::move(hint)}};
 }
 
-void Interpreter::ensureRoom() {
+void Interpreter::begin() {
   if (globals_.size() < checker_.globals().size()) globals_.resize(checker_.globals().size());
+  statements_ = 0;
 }
 
 void Interpreter::run(const std::vector<StatementPtr>& statements) {
-  ensureRoom();
+  begin();
   for (const StatementPtr& statement : statements) carryOut(*statement);
 }
 
@@ -177,7 +178,6 @@ void Interpreter::assignment(const Statement& statement) {
   const std::int64_t index = evaluate(*target.parts[1]).as<std::int64_t>();
   Value value = evaluate(*statement.expressions[1]);
   Value& array = variable(name.isGlobal, name.slot);
-  std::vector<Value> grown;
   const std::int64_t size = array.isSet() ? static_cast<std::int64_t>(array.as<Array>()->size()) : 0;
   if (index < 0 || index > size)
     fail(Code::outOfRange, target.parts[1]->span,

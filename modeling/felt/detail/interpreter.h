@@ -24,6 +24,8 @@ class Interpreter {
   /// What a parameter is instead of its value in the script; evaluated where it is declared.
   void set(int slot, const Expression& value) { settings_[slot] = &value; }
 
+  /// Before what has been checked since: there is room for what it declares, and limits count from here on.
+  void begin();
   /// @throws RunFault; Cancelled.
   void run(const std::vector<StatementPtr>& statements);
   /// @throws RunFault; Cancelled.
@@ -42,7 +44,6 @@ class Interpreter {
   };
 
   [[noreturn]] static void fail(Code code, const Span& span, std::string message, std::string hint = {});
-  void ensureRoom();
   Flow carryOut(const Statement& statement);
   Flow block(const Statement& statement);
   Flow loop(const Statement& statement);

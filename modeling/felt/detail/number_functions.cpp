@@ -29,7 +29,7 @@ void addPair(Registry& r, const std::string& name, const std::string& parameter,
 
 void addOfOne(Registry& r) {
   r.add("int abs(int a)", "The size without its sign.", "print(abs(-2));",
-        [](std::int64_t a) { return a < 0 ? -a : a; });
+        [](std::int64_t a) { return a < 0 ? difference(0, a) : a; });
   addPair(
       r, "abs", "a", "The size without its sign.", [](double a) { return std::abs(a); },
       [](const S& a) { return abs(a); });
@@ -84,7 +84,7 @@ void addOfSeveral(Registry& r) {
         "scalarfield azimuth = atan2(identity().x, identity().z);",
         [](const S& y, const S& x) { return atan2(y, x); });
   r.add("float pow(float a, float b)", "`a` to the power `b`.", "print(pow(2, 0.5));",
-        [](double a, double b) { return std::pow(a, b); });
+        [](double a, double b) { return power(a, b); });
   r.add("scalarfield pow(scalarfield a, scalarfield b)", "`a` to the power `b`; 0 to the power 0 is 1.",
         "scalarfield f = pow(abs(identity().x), 1.5);", [](const S& a, const S& b) { return pow(a, b); });
   r.add("int min(int a, int b)", "The smaller one.", "print(min(1, 2));",

@@ -11,10 +11,6 @@ namespace {
 
 using S = ScalarField;
 
-Vec3f finitePoint(const char* name, const Vec3d& point) {
-  return {finite(name, point.x), finite(name, point.y), finite(name, point.z)};
-}
-
 CloudSpecies speciesCalled(const std::string& name) {
   std::string all;
   for (const CloudSpecies species : cloudSpecies()) {
@@ -27,18 +23,17 @@ CloudSpecies speciesCalled(const std::string& name) {
 void addSolids(Registry& r) {
   r.add("scalarfield sphere(vector center, float radius)", "Distance to a sphere, positive inside.",
         "scalarfield s = sphere((0,0,0), 1);", [](const Vec3d& center, double radius) {
-          return sphere(finitePoint("center", center), finite("radius", radius));
+          return sphere(finite("center", center), finite("radius", radius));
         });
-  r.add("scalarfield box(vector center, vector lengths)",
-        "Distance to a box along the axes, positive inside.", "scalarfield b = box((0,0,0), (2,1,1));",
-        [](const Vec3d& center, const Vec3d& lengths) {
-          return box(Box{finitePoint("center", center - lengths * 0.5),
-                         finitePoint("lengths", center + lengths * 0.5)});
-        });
+  r.add(
+      "scalarfield box(vector center, vector lengths)", "Distance to a box along the axes, positive inside.",
+      "scalarfield b = box((0,0,0), (2,1,1));", [](const Vec3d& center, const Vec3d& lengths) {
+        return box(Box{finite("center", center - lengths * 0.5), finite("lengths", center + lengths * 0.5)});
+      });
   r.add("scalarfield plane(vector point, vector normal)",
         "Distance to a plane, positive where the normal points.",
         "scalarfield above = plane((0,0,0), (0,1,0));", [](const Vec3d& point, const Vec3d& normal) {
-          return plane(finitePoint("point", point), finitePoint("normal", normal));
+          return plane(finite("point", point), finite("normal", normal));
         });
   r.add("scalarfield torus(vector center, vector axis, float radius, float tube)",
         "Distance to a ring, positive inside: from its centre to the middle of the tube it is `radius`, the "
@@ -46,23 +41,23 @@ void addSolids(Registry& r) {
         "`tube` thick to each side.",
         "scalarfield ring = torus((0,0,0), (0,1,0), 1, 0.25);",
         [](const Vec3d& center, const Vec3d& axis, double radius, double tube) {
-          return torus({finitePoint("center", center), finitePoint("axis", axis), finite("radius", radius),
+          return torus({finite("center", center), finite("axis", axis), finite("radius", radius),
                         finite("tube", tube)});
         });
   r.add("scalarfield cone(vector apex, vector base, float radius)",
         "Distance to a cone with a flat base, positive inside.",
         "scalarfield c = cone((0,1,0), (0,0,0), 0.5);",
         [](const Vec3d& apex, const Vec3d& base, double radius) {
-          return cone({finitePoint("apex", apex), finitePoint("base", base), finite("radius", radius)});
+          return cone({finite("apex", apex), finite("base", base), finite("radius", radius)});
         });
   r.add("scalarfield capsule(vector a, vector b, float radius)", "Distance to a thick line, positive inside.",
         "scalarfield c = capsule((0,0,0), (0,1,0), 0.3);", [](const Vec3d& a, const Vec3d& b, double radius) {
-          return capsule(finitePoint("a", a), finitePoint("b", b), finite("radius", radius));
+          return capsule(finite("a", a), finite("b", b), finite("radius", radius));
         });
   r.add("scalarfield ellipsoid(vector center, vector radii)",
         "An ellipsoid, positive inside; a distance near its surface.",
         "scalarfield e = ellipsoid((0,0,0), (1,0.5,1));", [](const Vec3d& center, const Vec3d& radii) {
-          return ellipsoid(finitePoint("center", center), finitePoint("radii", radii));
+          return ellipsoid(finite("center", center), finite("radii", radii));
         });
   r.add("scalarfield cloudshape(string species = \"mediocris\", int seed = 0, float size = 1)",
         "A cumulus without detail that stands on y = 0: humilis, mediocris or congestus.",
@@ -106,7 +101,7 @@ void addCombinations(Registry& r) {
         options.noise.seed = seedOf(seed);
         options.octaves = inRange("octaves", octaves, 1, 32);
         options.roughness = finite("roughness", roughness);
-        return roughKnife({finitePoint("point", point), finitePoint("normal", normal)}, options).field;
+        return roughKnife({finite("point", point), finite("normal", normal)}, options).field;
       });
 }
 

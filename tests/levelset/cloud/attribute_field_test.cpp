@@ -11,6 +11,7 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/check_field.h"
+#include "tests/support/message_of.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"
 
@@ -41,15 +42,6 @@ Mesh plane(int n) {
       mesh.addFace(std::array<std::uint32_t, 3>{v(0, 0), v(1, 1), v(1, 0)});
     }
   return mesh;
-}
-
-std::string messageOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 double wave(const Vec3d& p) {

@@ -10,6 +10,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/function_field.h"
 #include "tests/support/density.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 
@@ -27,15 +28,6 @@ VectorField whirl() {
 
 FlowMap whirledMap(const std::shared_ptr<const BrickGrid>& grid) {
   return *advectGrids({grid}, whirl(), {.steps = 4, .rebakeShare = {}}).map;
-}
-
-std::string messageOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(AdvectionFiles, KeepAMapBitForBit) {

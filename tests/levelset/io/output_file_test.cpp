@@ -12,25 +12,19 @@
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
 namespace {
+
+using test::messageOf;
 
 using test::TemporaryFolder;
 using test::textOf;
 
 void write(const std::string& path, const std::string& text) {
   std::ofstream(path) << text;
-}
-
-std::string messageOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(OutputFile, AppearsOnCommitUnderItsName) {

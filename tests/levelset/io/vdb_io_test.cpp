@@ -9,6 +9,7 @@
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 #include "tests/support/test_meshes.h"
@@ -17,15 +18,6 @@ namespace nephele::test {
 namespace {
 
 using Class = VdbGridInfo::Class;
-
-std::string errorOf(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
 
 VdbGrid ballGrid(double voxelSize) {
   return toVdb(meshToLevelSet(icosphere(1.0, 4), {.voxelSize = voxelSize}), {"surface", Class::levelSet});
@@ -148,7 +140,7 @@ TEST(VdbIo, GridsFarFromTheOriginKeepTheirPlaceOrAreRefused) {
   };
   EXPECT_EQ(readAt(1.0f, 1e5f)->indexToWorld()(Vec3f{3, 0, 0}).x, 100003.0f);
   EXPECT_NEAR(readAt(0.01f, 100.0f)->indexToWorld()(Vec3f{3, 0, 0}).x, 100.03f, 1e-5f);
-  const std::string message = errorOf([&] { readAt(0.01f, 1e5f); });
+  const std::string message = messageOf([&] { readAt(0.01f, 1e5f); });
   for (const char* part : {"'density'", "100000", "0.01"})
     EXPECT_NE(message.find(part), std::string::npos) << message;
 }
@@ -180,17 +172,17 @@ TEST(VdbIo, HalfFloatsRoundToElevenBits) {
 }
 
 TEST(VdbIo, RefusesToMakeWhatFilesMustNotHold) {
-  EXPECT_NE(errorOf([] {
+  EXPECT_NE(messageOf([] {
               toVdb(smallGrid(1.0f, 2.0f), {"density", Class::fogVolume});
             }).find("background"),
             std::string::npos);
-  EXPECT_NE(errorOf([] {
+  EXPECT_NE(messageOf([] {
               toVdb(smallGrid(1.0f, 2.0f), {"surface", Class::levelSet});
             }).find("background"),
             std::string::npos);
   BrickGrid bad = smallGrid(0.0f, 1.0f);
   bad.brick(2)[12 * 11 + 3] = NAN;
-  EXPECT_EQ(errorOf([&] {
+  EXPECT_EQ(messageOf([&] {
               toVdb(bad, {"smoke\n2", Class::fogVolume});
             }),
             "grid 'smoke\\n2' holds values that are not finite");
@@ -199,10 +191,10 @@ TEST(VdbIo, RefusesToMakeWhatFilesMustNotHold) {
 TEST(VdbIo, RefusesMetadataWithoutAName) {
   const TemporaryFolder folder;
   const VdbGridLabel label{"density", Class::fogVolume, false, {{"", "1"}}};
-  EXPECT_EQ(errorOf([&] { toVdb(smallGrid(0.0f, 1.0f), label); }), "grid 'density': metadata needs names");
+  EXPECT_EQ(messageOf([&] { toVdb(smallGrid(0.0f, 1.0f), label); }), "grid 'density': metadata needs names");
   const std::string path = folder.file("a.vdb");
   const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"density", Class::fogVolume});
-  EXPECT_EQ(errorOf([&] { writeVdbFile(path, {grid}, {{"", "1"}}); }), path + ": metadata needs names");
+  EXPECT_EQ(messageOf([&] { writeVdbFile(path, {grid}, {{"", "1"}}); }), path + ": metadata needs names");
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
@@ -212,7 +204,7 @@ TEST(VdbIo, RefusesToWriteTextsThatAreTooLongToBeRead) {
   const std::string path = folder.file("a.vdb");
   const std::string most(std::size_t{64} << 20, 'x'), tooLong = most + 'x';
   const auto write = [&](const std::string& name, const std::string& key, const std::string& value) {
-    return errorOf([&] {
+    return messageOf([&] {
       writeVdbFile(path, {toVdb(smallGrid(0.0f, 1.0f), {name, Class::fogVolume})}, {{key, value}});
     });
   };
@@ -230,7 +222,7 @@ TEST(VdbIo, RefusesTwoGridsOfOneNameInOneLine) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.vdb");
   const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"smoke\n2", Class::fogVolume});
-  EXPECT_EQ(errorOf([&] {
+  EXPECT_EQ(messageOf([&] {
               writeVdbFile(path, {grid, grid}, {});
             }),
             path + ": two grids are called 'smoke\\n2'");
@@ -354,7 +346,7 @@ TEST(VdbIo, DescribesGridsThatHoldNoNumbers) {
     EXPECT_EQ(info.name, grid);
     EXPECT_EQ(info.type, type);
     EXPECT_EQ(info.activeVoxels, active);
-    const std::string message = errorOf([&] { readScalarGrid(path); });
+    const std::string message = messageOf([&] { readScalarGrid(path); });
     EXPECT_NE(message.find(path), std::string::npos) << message;
     EXPECT_NE(message.find(grid), std::string::npos) << message;
     EXPECT_NE(message.find(type), std::string::npos) << message;
@@ -366,10 +358,10 @@ TEST(VdbIo, MissingNameListsTheGridsThatAreThere) {
   NEPHELE_REQUIRE_SHARED_DATA(path);
   EXPECT_EQ(readVdbFile(path).size(), 5u);
   EXPECT_EQ(describe(readScalarGrid(path, "flame")).name, "flame");
-  const std::string message = errorOf([&] { readScalarGrid(path, "densty"); });
+  const std::string message = messageOf([&] { readScalarGrid(path, "densty"); });
   for (const char* part : {"densty", "density", "flame", "shadow", "temperature", "velocity"})
     EXPECT_NE(message.find(part), std::string::npos) << message;
-  EXPECT_NE(errorOf([&] { readScalarGrid(path, "velocity"); }).find("vec3s"), std::string::npos);
+  EXPECT_NE(messageOf([&] { readScalarGrid(path, "velocity"); }).find("vec3s"), std::string::npos);
 }
 
 TEST(VdbIo, AnEmptyGridReadsAsBackground) {
@@ -389,7 +381,7 @@ TEST(VdbIo, BadFilesNameThemselvesAndWhatIsWrong) {
                                    {"old_version_0_28.nvdb", "0.0.28"}}) {
     const std::string path = sharedData(std::string("malformed/") + file);
     NEPHELE_REQUIRE_SHARED_DATA(path);
-    const std::string message = errorOf([&] { readVdbFile(path); });
+    const std::string message = messageOf([&] { readVdbFile(path); });
     EXPECT_EQ(message.find(path), 0u) << message;
     EXPECT_NE(message.find(part), std::string::npos) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
@@ -426,7 +418,7 @@ TEST(VdbIo, AFullDiskLeavesAnErrorAndNoFile) {
   std::string message;
   {
     const FullDisk full(20000);
-    message = errorOf([&] { writeVdbFile(folder.file("full.vdb"), {grid}, {}); });
+    message = messageOf([&] { writeVdbFile(folder.file("full.vdb"), {grid}, {}); });
   }
   EXPECT_NE(message.find("full.vdb"), std::string::npos) << message;
   EXPECT_EQ(folder.entryCount(), 0u);
@@ -434,7 +426,7 @@ TEST(VdbIo, AFullDiskLeavesAnErrorAndNoFile) {
 
 TEST(VdbIo, AnUnwritableTargetIsNamed) {
   const VdbGrid grid = toVdb(smallGrid(0.0f, 1.0f), {"density", Class::fogVolume});
-  const std::string message = errorOf([&] { writeVdbFile("/no/such/folder/a.vdb", {grid}, {}); });
+  const std::string message = messageOf([&] { writeVdbFile("/no/such/folder/a.vdb", {grid}, {}); });
   EXPECT_NE(message.find("/no/such/folder"), std::string::npos) << message;
 }
 

@@ -5,19 +5,13 @@
 #include <fstream>
 
 #include "nephele/modeling/base/error.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
 namespace {
 
-std::string errorOf(const std::string& path, std::size_t mostBytes) {
-  try {
-    readTextFile(path, mostBytes);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::messageOf;
 
 TEST(TextFile, HoldsAllBytesOfAFile) {
   const test::TemporaryFolder folder;
@@ -31,10 +25,14 @@ TEST(TextFile, HoldsAllBytesOfAFile) {
 TEST(TextFile, WhatCannotBeReadIsRefused) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.file("a.txt")) << "four";
-  EXPECT_EQ(errorOf(folder.file("a.txt"), 3), folder.file("a.txt") + ": is larger than 3 bytes");
-  EXPECT_EQ(errorOf("/dev/zero", 1 << 20), "/dev/zero: is larger than 1048576 bytes");
-  EXPECT_EQ(errorOf(folder.file("none"), 3), folder.file("none") + ": cannot be opened for reading");
-  EXPECT_EQ(errorOf(folder.file("."), 3), folder.file(".") + ": is a folder, not a file");
+  EXPECT_EQ(messageOf([&] { readTextFile(folder.file("a.txt"), 3); }),
+            folder.file("a.txt") + ": is larger than 3 bytes");
+  EXPECT_EQ(messageOf([&] { readTextFile("/dev/zero", 1 << 20); }),
+            "/dev/zero: is larger than 1048576 bytes");
+  EXPECT_EQ(messageOf([&] { readTextFile(folder.file("none"), 3); }),
+            folder.file("none") + ": cannot be opened for reading");
+  EXPECT_EQ(messageOf([&] { readTextFile(folder.file("."), 3); }),
+            folder.file(".") + ": is a folder, not a file");
 }
 
 }  // namespace

@@ -163,6 +163,17 @@ TEST(FeltLanguage, ASessionKeepsWhatItWasTold) {
   EXPECT_EQ(shown(again.value, again.type), "3");
 }
 
+TEST(FeltLanguage, LimitsOfASessionHoldForEachEntry) {
+  Context context;
+  context.limits.statements = 100;
+  Session session(allFunctions(), context);
+  session.enter("func int turns() { int n = 0; while (n < 40) n++; return n; }");
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(session.enter("turns()").value.as<std::int64_t>(), 40);
+  EXPECT_THROW(session.enter("while (true) { }"), ScriptError);
+  EXPECT_EQ(session.enter("turns()").value.as<std::int64_t>(), 40);
+  session.enter("int a = turns();");
+}
+
 TEST(FeltLanguage, WhatIsReadTwiceIsEvaluatedOnce) {
   // Without remembering, each step would evaluate the one before twice, and this would not end.
   const std::string script =

@@ -199,6 +199,19 @@ TEST(FeltMessages, LimitsEndWhatHasNoEnd) {
             std::string::npos);
 }
 
+TEST(FeltMessages, TellWhatNumbersCannotBe) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"print(abs(-9223372036854775807 - 1));", "the result is no integer of 64 bits"},
+      {"print((-1) ^ 0.5);", "-1 to the power 0.5 is no number"},
+      {"print(pow(-8, 1.0/3));", "-8 to the power 0.333333 is no number"},
+      {"print(0 ^ -1);", "division by zero"},
+      {"domain d((0,0,0), (2147483648,1,1), (0,0,0), 1, 1, 1);", "a domain may have 2.1e+09 cells at most"},
+  };
+  for (const auto& [script, message] : cases)
+    EXPECT_NE(faultsOf(script).find(message), std::string::npos) << script << faultsOf(script);
+  EXPECT_EQ(printed("print((-2) ^ 3, pow(-2, -1), abs(-3), 0 ^ 0);"), "-8 -0.5 3 1\n");
+}
+
 TEST(FeltMessages, AScriptCutOffAnywhereIsRefusedOrRuns) {
   const std::string script =
       "// a cloud\nparam float gain = 1.5e0 in [0, 4] \"how much\";\n"

@@ -8,6 +8,7 @@
 #include "nephele/levelset/felt/grid_functions.h"
 #include "nephele/modeling/felt/program.h"
 #include "nephele/render/image/exr_io.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 
 namespace nephele::felt {
@@ -26,15 +27,6 @@ const Registry& functions() {
 
 void run(const std::string& script, Context context = {}) {
   Program("s.felt", script, functions()).run(context);
-}
-
-std::string refusal(const std::string& script, const Context& context = {}) {
-  try {
-    run(script, context);
-  } catch (const ScriptError& error) {
-    return error.what();
-  }
-  return "no fault";
 }
 
 // A black ball of radius R that glows: C = e (1 - exp(-2 k R)) and alpha = 1 - exp(-2 k R) through its
@@ -80,7 +72,8 @@ TEST(FeltRender, RefusesWhatMakesNoPicture) {
   const std::string ball = "mask(sphere((0,0,0), 1), 0.2)";
   const auto says = [&](const std::string& name, const std::string& rest, const std::string& words,
                         const Context& context = {}) {
-    const std::string said = refusal("render(\"" + folder.file(name) + "\", " + rest + ");", context);
+    const std::string said =
+        test::messageOf([&] { run("render(\"" + folder.file(name) + "\", " + rest + ");", context); });
     EXPECT_NE(said.find(words), std::string::npos) << rest << "\n" << said;
   };
   says("a.jpg", "1, (0,0,5), (0,0,0)", "must end with .exr, .png");
@@ -110,6 +103,13 @@ TEST(FeltRender, HasExamplesThatRun) {
   }
   std::filesystem::current_path(before);
   EXPECT_EQ(folder.entryCount(), functions().named("render").size());
+}
+
+TEST(FeltRender, EndingsMayBeInCapitals) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("ball.Png");
+  run("render(\"" + path + "\", mask(sphere((0,0,0), 1), 0.2), (0,0,5), (0,0,0), width = 8, height = 8);");
+  EXPECT_EQ(test::textOf(path).substr(1, 3), "PNG");
 }
 
 }  // namespace

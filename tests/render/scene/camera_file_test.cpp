@@ -6,22 +6,16 @@
 #include <fstream>
 
 #include "nephele/modeling/base/error.h"
+#include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
 namespace {
 
+using test::messageOf;
+
 void expectNear(const Vec3d& a, const Vec3d& b, double tolerance = 1e-9) {
   for (int axis = 0; axis != 3; ++axis) EXPECT_NEAR(a[axis], b[axis], tolerance) << axis;
-}
-
-std::string messageOf(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
 }
 
 TEST(Rotation, TurnsAboutItsAxesInTheirOrder) {
