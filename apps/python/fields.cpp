@@ -1,4 +1,5 @@
 // Fields: values, gradients and ranges at arrays of points, and functions of Python as fields.
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 
 #include <cstring>
@@ -62,6 +63,12 @@ void gather(const char* from, py::ssize_t row, py::ssize_t column, std::size_t c
   }
 }
 
+/// Whether the three columns of an array lie in memory as lanes do, as in arrays of Fortran's order.
+bool areLanes(const char* from, py::ssize_t row, py::ssize_t column) {
+  return row == sizeof(float) && column % py::ssize_t(alignof(float)) == 0 &&
+         reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0;
+}
+
 /// body(first, count, x y z) for pieces of the points, on all threads.
 template <class Body>
 void forPieces(const Points& points, Watch& watch, const Body& body) {
@@ -72,8 +79,16 @@ void forPieces(const Points& points, Watch& watch, const Body& body) {
         points.count, kPiece,
         [&](std::size_t begin, std::size_t end) {
           const std::size_t count = end - begin;
+          const char* first = data + py::ssize_t(begin) * row;
+          if (areLanes(first, row, column)) {
+            const auto lane = [&](int axis) {
+              return std::span(reinterpret_cast<const float*>(first + axis * column), count);
+            };
+            body(begin, count, PointSpans{lane(0), lane(1), lane(2)});
+            return;
+          }
           float x[kPiece], y[kPiece], z[kPiece];
-          gather(data + py::ssize_t(begin) * row, row, column, count, x, y, z);
+          gather(first, row, column, count, x, y, z);
           body(begin, count, PointSpans{{x, count}, {y, count}, {z, count}});
         },
         watch);
@@ -88,6 +103,22 @@ void forPieces(const Points& points, Watch& watch, const Body& body) {
 py::array_t<float> newArray(const std::vector<py::ssize_t>& shape) {
   py::array_t<float> array(shape);
   detail::adviseHugePages(array.mutable_data(), array.mutable_data() + array.size());
+  return array;
+}
+
+/// Where values go: `out` if there is one, else a new array.
+py::array_t<float> arrayFor(const std::vector<py::ssize_t>& shape, const py::object& out,
+                            const Points& points) {
+  if (out.is_none()) return newArray(shape);
+  if (!py::isinstance<py::array_t<float, py::array::c_style>>(out))
+    throw py::type_error("out: expected an array of float32 that lies in one piece, in C's order");
+  auto array = py::reinterpret_borrow<py::array_t<float>>(out);
+  if (std::size_t(array.ndim()) != shape.size() || !std::equal(shape.begin(), shape.end(), array.shape()))
+    throw py::value_error(
+        fmt::format("out: expected shape ({}), got {}", fmt::join(shape, ", "), shapeText(array)));
+  if (!array.writeable()) throw py::value_error("out: the array is read-only");
+  if (py::module_::import("numpy").attr("may_share_memory")(array, points.array).cast<bool>())
+    throw py::value_error("out: the array shares memory with the points");
   return array;
 }
 
@@ -131,10 +162,10 @@ py::object result(const py::array_t<float>& values) {
 }
 
 template <class T>
-py::object valuesAt(const PythonField<T>& self, const py::object& object) {
+py::object valuesAt(const PythonField<T>& self, const py::object& object, const py::object& out) {
   constexpr int kLanes = kComponents<T>;
   const Points points = pointsFrom(object);
-  py::array_t<float> values = newArray(shapeOfValues<T>(points));
+  py::array_t<float> values = arrayFor(shapeOfValues<T>(points), out, points);
   float* to = values.mutable_data();
   const Field<T> field = self.field();
   Watch watch;
@@ -147,7 +178,7 @@ py::object valuesAt(const PythonField<T>& self, const py::object& object) {
       interleave(lanes, count, to + first * kLanes);
     }
   });
-  return result(values);
+  return out.is_none() ? result(values) : py::object(out);
 }
 
 template <class T>
@@ -305,9 +336,11 @@ py::class_<PythonField<T>> addField(py::module_& module, const char* name, const
   using Self = PythonField<T>;
   return py::class_<Self>(module, name, text)
       .def(
-          "__call__", valuesAt<T>, "points"_a,
+          "__call__", valuesAt<T>, "points"_a, py::kw_only(), "out"_a = py::none(),
           "Values at points, an array of any shape that ends in 3; any dtype and strides, read where it lies "
-          "if it holds 32 bit floats, else converted. All threads; the GIL is released.")
+          "if it holds 32 bit floats, else converted; in Fortran's order, three columns, nothing is moved. "
+          "`out`, an array of float32 of the result's shape, is written and returned in place of a new one. "
+          "All threads; the GIL is released.")
       .def(
           "gradient",
           [](const Self& self, const py::object& points) -> py::object {

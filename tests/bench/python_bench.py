@@ -28,17 +28,20 @@ def fastest(work, runs=7):
 def fields(build):
     points = np.random.default_rng(1).uniform(-2, 2, (10_000_000, 3)).astype(np.float32)
     ball = nephele.sphere((0, 0, 0), 1)
-    made = {"sphere": ball, "cloud": ball + 0.1 * abs(nephele.fractalsum(4, 3.0))}
+    cloud = ball + 0.1 * abs(nephele.fractalsum(4, 3.0))
+    columns, values = np.asfortranarray(points), np.zeros(len(points), np.float32)
+    made = {"cloud, new_array": lambda: cloud(points), "sphere, new_array": lambda: ball(points),
+            "sphere, written_again": lambda: ball(points, out=values), "sphere, columns_written_again": lambda: ball(columns, out=values)}
     pairs = {name: [] for name in made}
     for _ in range(25):
         lines = subprocess.run([os.path.join(build, "bin/python_peer")], capture_output=True, text=True, check=True).stdout
-        its = dict(line.split() for line in lines.splitlines())
-        for name, field in made.items():
-            pairs[name].append((fastest(lambda field=field: field(points)), float(its[name])))
+        its = dict(line.rsplit(" ", 1) for line in lines.splitlines())
+        for name, work in made.items():
+            pairs[name].append((fastest(work), float(its[name])))
     for name, times in pairs.items():
         mine, peer = (100 * statistics.median(column) for column in zip(*times))
         ratios = sorted(a / b for a, b in times)
-        print(f"field, {name}, 10^7 points: {mine:.2f} ns per point, C++ {peer:.2f}, {statistics.median(ratios):.3f} times "
+        print(f"{name.replace('_', ' ')}, 10^7 points: {mine:.2f} ns per point, C++ {peer:.2f}, {statistics.median(ratios):.3f} times "
               f"({ratios[0]:.3f} to {ratios[-1]:.3f}), medians of {len(times)} pairs")
 
 

@@ -35,6 +35,26 @@ class Values(Case):
         whole = np.array([[1, 2, 3], [0, 0, 0]], np.int16)
         self.assertNear(BALL(whole), [1 - 14 ** 0.5, 1])
 
+    def test_are_written_where_they_are_wanted(self):
+        p = random_points(5000)
+        wanted = BALL(p)
+        out = np.full(5000, 7, np.float32)
+        self.assertIs(BALL(p, out=out), out)
+        np.testing.assert_array_equal(out, wanted)
+        np.testing.assert_array_equal(BALL(np.asfortranarray(p), out=out), wanted)
+        vectors = np.zeros((4, 5, 3), np.float32)
+        self.assertIs(nephele.identity()(np.ones((4, 5, 3)), out=vectors), vectors)
+        self.assertTrue((vectors == 1).all())
+        frozen = np.zeros(5000, np.float32)
+        frozen.flags.writeable = False
+        for wrong, error, text in ((np.zeros(4999, np.float32), ValueError, r"expected shape \(5000\)"),
+                                   (np.zeros((5000, 1), np.float32), ValueError, "expected shape"),
+                                   (frozen, ValueError, "read-only"), (p[:, 0].base.reshape(-1)[:5000], ValueError, "shares memory"),
+                                   (np.zeros(5000), TypeError, "float32"), (np.zeros(10000, np.float32)[::2], TypeError, "one piece"),
+                                   ([0] * 5000, TypeError, "float32")):
+            with self.assertRaisesRegex(error, text):
+                BALL(p, out=wrong)
+
     def test_of_strides_of_zero_are_those_of_one_point(self):
         one = np.broadcast_to(np.float32([1, 2, 2]), (1000, 3))
         np.testing.assert_array_equal(BALL(one), np.full(1000, -2, np.float32))

@@ -192,9 +192,11 @@ class Picture:
 class ScalarField:
     """A number everywhere in space: an expression that never changes, positive inside where it is a shape."""
     def __init__(self, other: Any) -> Any: ...
-    def __call__(self, points: Any) -> Any:
+    def __call__(self, points: Any, *, out: Any = None) -> Any:
         """Values at points, an array of any shape that ends in 3; any dtype and strides, read where it lies if
-        it holds 32 bit floats, else converted. All threads; the GIL is released.
+        it holds 32 bit floats, else converted; in Fortran's order, three columns, nothing is moved. `out`, an
+        array of float32 of the result's shape, is written and returned in place of a new one. All threads;
+        the GIL is released.
         """
         ...
     def gradient(self, points: Any) -> Any:
@@ -231,9 +233,11 @@ class ScalarField:
 class VectorField:
     """A vector everywhere in space: an expression that never changes."""
     def __init__(self, other: Any) -> Any: ...
-    def __call__(self, points: Any) -> Any:
+    def __call__(self, points: Any, *, out: Any = None) -> Any:
         """Values at points, an array of any shape that ends in 3; any dtype and strides, read where it lies if
-        it holds 32 bit floats, else converted. All threads; the GIL is released.
+        it holds 32 bit floats, else converted; in Fortran's order, three columns, nothing is moved. `out`, an
+        array of float32 of the result's shape, is written and returned in place of a new one. All threads;
+        the GIL is released.
         """
         ...
     def gradient(self, points: Any) -> Any:
@@ -277,9 +281,11 @@ class VectorField:
 class MatrixField:
     """A 3 x 3 matrix everywhere in space: an expression that never changes."""
     def __init__(self, other: Any) -> Any: ...
-    def __call__(self, points: Any) -> Any:
+    def __call__(self, points: Any, *, out: Any = None) -> Any:
         """Values at points, an array of any shape that ends in 3; any dtype and strides, read where it lies if
-        it holds 32 bit floats, else converted. All threads; the GIL is released.
+        it holds 32 bit floats, else converted; in Fortran's order, three columns, nothing is moved. `out`, an
+        array of float32 of the result's shape, is written and returned in place of a new one. All threads;
+        the GIL is released.
         """
         ...
     def gradient(self, points: Any) -> Any:
