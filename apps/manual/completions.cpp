@@ -35,6 +35,13 @@ std::string verbNames(const std::vector<Verb>& verbs) {
   return names;
 }
 
+/// The words that stand behind the name of a verb, where there are such.
+std::vector<std::string> wordsBehind(const Verb& verb) {
+  for (const OptionRow& row : optionTable(verb))
+    if (row.isInput) return row.choices();
+  return {};
+}
+
 std::string forBash(const std::vector<Verb>& verbs) {
   std::string text = fmt::format(
       R"(# Completion of nephele for bash.
@@ -59,6 +66,8 @@ _nephele() {{
       if (const auto choices = row.choices(); !choices.empty())
         words += fmt::format("        --{}) words='{}' ;;\n", row.name, fmt::join(choices, " "));
     }
+    if (const auto behind = wordsBehind(verb); !behind.empty())
+      words += fmt::format("        {}) words='{}' ;;\n", verb.name, fmt::join(behind, " "));
     text +=
         fmt::format("    {})\n      options='{} --help --help-all'\n      case $before in\n{}      esac ;;\n",
                     verb.name, options.substr(1), words);
@@ -82,8 +91,9 @@ std::string forZsh(const std::vector<Verb>& verbs) {
   for (const Verb& verb : verbs)
     text += fmt::format("    {}\n", quoted(verb.name + ":" + firstSentence(verb.summary), ""));
   text +=
-      "  )\n  if (( CURRENT == 2 )); then\n    _describe verb verbs\n    return\n  fi\n  local "
-      "verb=$words[2]\n"
+      "  )\n  local verb=$words[2]\n  if (( CURRENT == 2 )) || [[ $verb == help ]]; then\n"
+      "    (( CURRENT == 2 )) && verbs+=('help:Says what a verb does')\n    _describe verb verbs\n    "
+      "return\n  fi\n"
       "  shift words\n  (( CURRENT-- ))\n  case $verb in\n";
   for (const Verb& verb : verbs) {
     text += fmt::format("    {})\n      _arguments \\\n", verb.name);
@@ -110,6 +120,8 @@ std::string forZsh(const std::vector<Verb>& verbs) {
                                                                 row.name, row.isFlag ? "" : "=", help, value),
                                                     ""));
     }
+    if (const auto behind = wordsBehind(verb); !behind.empty())
+      text += fmt::format("        '1:word:({})' \\\n", fmt::join(behind, " "));
     text += "        '*:file:_files' ;;\n";
   }
   return text + "  esac\n}\n_nephele \"$@\"\n";
@@ -120,7 +132,17 @@ std::string forFish(const std::vector<Verb>& verbs) {
   for (const Verb& verb : verbs)
     text += fmt::format("complete -c nephele -f -n __fish_use_subcommand -a {} -d {}\n", verb.name,
                         quoted(firstSentence(verb.summary), "\\"));
-  for (const Verb& verb : verbs)
+  text += fmt::format(
+      "complete -c nephele -f -n __fish_use_subcommand -a help -d 'Says what a verb does'\n"
+      "complete -c nephele -f -n '__fish_seen_subcommand_from help' -a '{}'\n",
+      verbNames(verbs));
+  for (const Verb& verb : verbs) {
+    if (const auto behind = wordsBehind(verb); !behind.empty())
+      text += fmt::format(
+          "complete -c nephele -f -n '__fish_seen_subcommand_from {}; and test (count (commandline -opc)) "
+          "-eq "
+          "2' -a '{}'\n",
+          verb.name, fmt::join(behind, " "));
     for (const OptionRow& row : optionTable(verb)) {
       if (row.isInput) continue;
       text +=
@@ -131,6 +153,7 @@ std::string forFish(const std::vector<Verb>& verbs) {
         text += fmt::format(" -a '{}'", fmt::join(choices, " "));
       text += fmt::format(" -d {}\n", quoted(firstSentence(row.help), "\\"));
     }
+  }
   return text;
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <regex>
 
@@ -67,6 +68,50 @@ TEST(Manual, CompletesInBash) {
   EXPECT_EQ(completed("nephele tr", 1, "nephele"), "transfer transform\n");
   EXPECT_EQ(completed("nephele cloud --noise per", 3, "--noise"), "perlin\n");
   EXPECT_EQ(completed("nephele cloud --noise-s", 2, "cloud"), "--noise-speed\n");
+  EXPECT_EQ(completed("nephele felt ch", 2, "felt"), "check\n");
+}
+
+TEST(Manual, CompletesInFish) {
+  if (std::system("fish --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "there is no fish";
+  const TemporaryFolder folder;
+  const std::string script = folder.file("nephele.fish"), out = folder.file("out");
+  std::ofstream(script) << runProgram("help --completion fish").output;
+  const auto completed = [&](const std::string& line) {
+    const std::string command = "HOME=" + folder.file("home") + " fish --no-config -c 'source " + script +
+                                "; complete -C \"" + line + "\" | cut -f1' >" + out +
+                                " 2>&1 </dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0) << line;
+    return textOf(out);
+  };
+  EXPECT_EQ(completed("nephele tr"), "transfer\ntransform\n");
+  EXPECT_EQ(completed("nephele cloud --noise per"), "perlin\n");
+  EXPECT_EQ(completed("nephele cloud --noise-s"), "--noise-speed\n");
+  EXPECT_EQ(completed("nephele felt ch"), "check\n");
+  EXPECT_EQ(completed("nephele help tur"), "turntable\n");
+}
+
+// What zsh offers stands on the line that it shows once a tabulator was pressed.
+TEST(Manual, CompletesInZsh) {
+  if (std::system("zsh --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "there is no zsh";
+  const TemporaryFolder folder;
+  const std::string script = folder.file("try.zsh"), out = folder.file("out");
+  std::ofstream(folder.file("_nephele")) << runProgram("help --completion zsh").output;
+  std::ofstream(script) << "zmodload zsh/zpty\nzpty z zsh -f -i\n"
+                           "zpty -w z 'PS1=; fpath=("
+                        << folder.file("")
+                        << " $fpath); autoload -U compinit; compinit -u -D; echo rea''dy'\n"
+                        << "zpty -r z text '*ready*'\n"
+                           "zpty -w -n z $1$'\\t'\nzpty -r z text \"*$2*\" && print found\n";
+  const auto completes = [&](const std::string& line, const std::string& to) {
+    const std::string command =
+        "timeout 60 zsh -f " + script + " '" + line + "' '" + to + "' >" + out + " 2>&1 </dev/null";
+    return std::system(command.c_str()) == 0 && textOf(out) == "found\n";
+  };
+  EXPECT_TRUE(completes("nephele turn", "turntable"));
+  EXPECT_TRUE(completes("nephele cloud --noise wor", "worley"));
+  EXPECT_TRUE(completes("nephele cloud --noise-s", "--noise-speed"));
+  EXPECT_TRUE(completes("nephele felt form", "format"));
+  EXPECT_TRUE(completes("nephele help turn", "turntable"));
 }
 
 }  // namespace
