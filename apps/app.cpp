@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <iostream>
 #include <new>
+#include <set>
 #include <span>
 
 #include "apps/detail/call_sheet.h"
@@ -110,76 +111,122 @@ bool given(const CLI::App& app, const char* name) {
 /// What a command line stands for: its arguments, and the calls that it makes of them.
 struct Line {
   std::vector<std::string> arguments;
-  std::optional<Sequence> sequence;
-  std::optional<Wedge> wedge;
+  /// One for each value of the wedge, or one.
+  std::vector<Sequence> sequences{};
+  std::optional<Wedge> wedge{};
   SeveralCalls calls{};
   /// Those that came from files and looks, as they would be typed.
   std::string configOptions{};
 
-  bool isSeveral() const { return sequence || wedge; }
+  bool isSequence() const { return !sequences.empty(); }
+  bool isSeveral() const { return isSequence() || wedge; }
   std::vector<std::string> first() const { return isSeveral() ? calls.at(0).arguments : arguments; }
 };
 
 /// Options that a file or a look sets come behind those of `typed`.
 using WithSettings = std::function<std::vector<std::string>(std::vector<std::string> typed)>;
 
+/// The calls of a wedge, each with `argumentsOf` it.
+SeveralCalls callsOf(const Wedge& wedge, std::function<std::vector<std::string>(std::size_t)> argumentsOf) {
+  SeveralCalls calls;
+  calls.count = wedge.size();
+  calls.list = "wedge";
+  calls.word = "calls";
+  for (std::size_t i = 0; i != calls.count; ++i) calls.made.push_back(i);
+  calls.at = [=](std::size_t i) {
+    return Call{wedge.label(i), {}, {{"values", wedge.values(i)}}, argumentsOf(i)};
+  };
+  return calls;
+}
+
+/// Every sequence one after the other, of a wedge if there is one.
+SeveralCalls callsOf(const std::vector<Sequence>& sequences, const std::optional<Wedge>& wedge) {
+  const std::size_t frames = sequences.front().size();
+  SeveralCalls calls;
+  calls.count = sequences.size() * frames;
+  calls.list = wedge ? "wedge" : "frames";
+  calls.word = "frames";
+  calls.perRange = frames;
+  for (std::size_t i = 0; i != sequences.size(); ++i)
+    for (const std::size_t frame : sequences[i].made()) calls.made.push_back(i * frames + frame);
+  calls.at = [=](std::size_t i) {
+    Call call = sequences[i / frames].call(i % frames);
+    if (!wedge) return call;
+    call.name = wedge->label(i / frames) + ", " + call.name;
+    call.values["values"] = wedge->values(i / frames);
+    return call;
+  };
+  return calls;
+}
+
 Line lineOf(const Command& command, std::vector<std::string> typed, const WithSettings& withSettings) {
   Line line;
-  if (!command.hasOwnFrames()) line.wedge = Wedge::taken(typed, command.app);
-  line.arguments = withSettings(typed);
-  const bool hasSheet = !command.hasOwnFrames() && givenTo("--contact-sheet", line.arguments);
-  if (!command.hasOwnFrames() && givenTo("--frames", line.arguments)) {
-    if (line.wedge)
-      throw CLI::ValidationError(
-          "--wedge",
-          "is for one frame; leave out --frames, or call once for each value, with the "
-          "value in place of --wedge");
-    if (hasSheet) line.arguments = withPreview(line.arguments, command.app);
-    line.sequence = Sequence::of(line.arguments);
-    line.calls = {line.sequence->size(),
-                  [sequence = *line.sequence](std::size_t i) { return sequence.call(i); },
-                  line.sequence->made(),
-                  false,
-                  "frames",
-                  "frames"};
+  if (command.hasOwnFrames()) {
+    line.arguments = withSettings(std::move(typed));
+    return line;
   }
-  if (line.wedge) {
-    line.calls.count = line.wedge->size();
-    line.calls.list = "wedge";
-    line.calls.word = "calls";
+  line.wedge = Wedge::taken(typed, command.app);
+  line.arguments = withSettings(typed);
+  const bool hasSheet = givenTo("--contact-sheet", line.arguments).has_value();
+  const auto withSheet = [=, &command](std::vector<std::string> arguments) {
+    return hasSheet ? withPreview(std::move(arguments), command.app) : arguments;
+  };
+  const auto ofValue = [=, &command, wedge = line.wedge](std::size_t i) {
+    std::vector<std::string> own = wedge->arguments(i);
+    own.insert(own.begin(), typed.begin(), typed.end());
+    return wedge->named(withSheet(withSettings(std::move(own))), i, command.app);
+  };
+  if (givenTo("--frames", line.arguments)) {
+    if (!line.wedge) line.sequences.push_back(*Sequence::of(withSheet(line.arguments)));
+    for (std::size_t i = 0; line.wedge && i != line.wedge->size(); ++i) {
+      line.sequences.push_back(*Sequence::of(ofValue(i)));
+      line.wedge->requireFew(line.sequences.front().size());
+    }
+    line.calls = callsOf(line.sequences, line.wedge);
+  } else if (line.wedge) {
+    line.calls = callsOf(*line.wedge, ofValue);
     // Densities that differ would be hidden by extinctions that suit each of them.
     line.calls.variesInputs = command.app.get_option_no_throw("--extinction") != nullptr;
-    for (std::size_t i = 0; i != line.calls.count; ++i) line.calls.made.push_back(i);
-    line.calls.at = [=, &command, wedge = *line.wedge](std::size_t i) {
-      std::vector<std::string> own = wedge.arguments(i);
-      own.insert(own.begin(), typed.begin(), typed.end());
-      std::vector<std::string> all = withSettings(std::move(own));
-      if (hasSheet) all = withPreview(std::move(all), command.app);
-      return Call{
-          wedge.label(i), {}, {{"values", wedge.values(i)}}, wedge.named(std::move(all), i, command.app)};
-    };
   }
   return line;
 }
 
-/// Looks before the work whether it can be done, with the options of the first call.
-void check(Command& command, const Line& line, const Run& run) {
+/// Looks before the work whether it can be done, with the options of the first call, and of the first of
+/// every sequence.
+void check(Command& command, Line& line, const Run& run) {
   requireDistinctOutputs(command.app);
-  if (line.sequence)
-    line.sequence->check(command.app, run);
-  else if (!command.verb.passesOthersOn)
-    refuseFrameNames(command.app);
-  for (std::size_t i = 1; line.wedge && i < line.calls.count; ++i)
-    Command(command.verb).parse(line.calls.at(i).arguments);
+  if (!line.isSequence() && !command.verb.passesOthersOn) refuseFrameNames(command.app);
+  std::set<std::string> known;
+  const std::size_t frames = line.isSequence() ? line.sequences.front().size() : 1;
+  for (std::size_t i = 0; line.isSeveral() && i < line.calls.count; i += frames) {
+    Command own(command.verb);
+    own.parse(line.calls.at(i).arguments);
+    if (!line.isSequence()) continue;
+    const Sequence& sequence = line.sequences[i / frames];
+    sequence.check(own.app, known, run);
+    line.calls.variesInputs = line.calls.variesInputs || sequence.variesInputs(own.app);
+  }
   tryOutputs(command.app);
   if (line.isSeveral() && !command.options.contactSheet.empty()) requireSeen(command.app);
   for (const char* option : {"--only", "--shard", "--skip-existing", "--contact-sheet"}) {
     const bool isOfFrames = option == std::string_view("--only") || option == std::string_view("--shard");
     if (!command.hasOwnFrames() && given(command.app, option) &&
-        !(isOfFrames ? line.sequence.has_value() : line.isSeveral()))
+        !(isOfFrames ? line.isSequence() : line.isSeveral()))
       throw CLI::ValidationError(option, isOfFrames ? "is for sequences; give --frames"
                                                     : "is for several calls; give --frames or --wedge");
   }
+}
+
+/// What the contact sheet shows: all, or of the sequence of every value of a wedge the frame in its middle.
+std::vector<MadeCall> shownOf(const Line& line, std::vector<MadeCall> made) {
+  if (!line.wedge || !line.isSequence()) return made;
+  std::vector<MadeCall> shown;
+  const std::size_t frames = made.size() / line.sequences.size();
+  for (std::size_t i = 0; frames > 0 && i != line.sequences.size(); ++i) {
+    shown.push_back(std::move(made[i * frames + frames / 2]));
+    shown.back().name = line.wedge->label(i);
+  }
+  return shown;
 }
 
 /// What the command line asks for.
@@ -188,10 +235,10 @@ void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramR
   if (!line.isSeveral()) return command.bound.body(run);
   const CommonOptions& options = command.options;
   line.calls.skipExisting = options.skipExisting;
-  if (line.sequence) line.calls.variesInputs = line.sequence->variesInputs(command.app);
-  const std::vector<MadeCall> made = makeCalls(command.verb, line.calls, run);
+  std::vector<MadeCall> made = makeCalls(command.verb, line.calls, run);
   if (options.contactSheet.empty()) return;
-  writeCallSheet(options.contactSheet, made, line.wedge ? line.wedge->columns() : std::nullopt,
+  writeCallSheet(options.contactSheet, shownOf(line, std::move(made)),
+                 line.wedge ? line.wedge->columns() : std::nullopt,
                  *std::ranges::find(verbs, "render", &Verb::name), run);
 }
 

@@ -186,12 +186,12 @@ void Sequence::requireNumberedOutputs(const CLI::App& first) const {
   }
 }
 
-void Sequence::check(const CLI::App& first, const Run& run) const {
+void Sequence::check(const CLI::App& first, std::set<std::string>& known, const Run& run) const {
   requireNumberedOutputs(first);
-  const std::vector<File> files = inputs(first);
+  std::vector<File> files = inputs(first);
+  std::erase_if(files, [&](const File& file) { return !known.insert(file.name()).second; });
   for (const File& file : files)
-    requireFrames(file.word->pattern.text().substr(file.start), range_.frames(),
-                  [&](int frame) { return file.path(frame); });
+    requireFrames(file.name(), range_.frames(), [&](int frame) { return file.path(frame); });
   for (const File& file : files)
     requireSameGrids(
         range_.frames(), [&](int frame) { return file.path(frame); }, run);

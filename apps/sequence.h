@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,9 @@ class Sequence {
   /// Looks before the work whether it can be done, `first` being the options of the first call: outputs need
   /// a place for the number, inputs must be there for every frame, and volumes hold the same grids. Makes the
   /// folders of outputs.
+  /// What is in `known` has been looked at already; what is looked at is added.
   /// @throws CLI::ValidationError naming the option, Error naming the frames that are missing, or the file.
-  void check(const CLI::App& first, const Run& run) const;
+  void check(const CLI::App& first, std::set<std::string>& known, const Run& run) const;
 
   /// Whether an input differs from frame to frame.
   bool variesInputs(const CLI::App& first) const { return !inputs(first).empty(); }
@@ -70,6 +72,7 @@ class Sequence {
     const Word* word;
     std::size_t start;
     std::string path(int frame) const { return word->pattern.path(frame).substr(start); }
+    std::string name() const { return word->pattern.text().substr(start); }
   };
 
   explicit Sequence(std::vector<std::string> arguments);

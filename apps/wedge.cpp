@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "apps/options/config_file.h"
 #include "apps/options/options.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/nearest_name.h"
@@ -146,6 +147,14 @@ std::size_t Wedge::size() const {
   return count;
 }
 
+void Wedge::requireFew(std::size_t frames) const {
+  if (size() * frames > kMost)
+    throw CLI::ValidationError(
+        "--wedge",
+        fmt::format("{} frames of {} values are {} calls, more than {}; give fewer values or frames", frames,
+                    size(), size() * frames, kMost));
+}
+
 std::optional<int> Wedge::columns() const {
   return axes_.size() == 2 ? std::optional(int(axes_[1].values.size())) : std::nullopt;
 }
@@ -180,9 +189,10 @@ std::string Wedge::label(std::size_t index) const {
   return text;
 }
 
-std::string Wedge::fileName(const std::string& path, std::size_t index) const {
+std::string Wedge::fileName(const std::string& path, std::size_t index, bool isSequence) const {
   if (isStream(path)) return path;
-  if (FramePattern::places(path) == 1) return FramePattern::parse(path).path(int(index) + 1);
+  const bool hasPlace = FramePattern::places(path) == 1;
+  if (hasPlace && !isSequence) return FramePattern::parse(path).path(int(index) + 1);
   std::string values;
   for (std::size_t axis = 0; axis != axes_.size(); ++axis) {
     const std::string own = inFileName(valueOf(axis, index));
@@ -193,23 +203,26 @@ std::string Wedge::fileName(const std::string& path, std::size_t index) const {
         break;
       else if (inFileName(other) == own)
         name += "_";
-    values += fmt::format(".{}_{}", axes_[axis].option, name);
+    values += fmt::format("{}{}_{}", values.empty() ? "" : ".", axes_[axis].option, name);
   }
+  if (hasPlace) return FramePattern::parse(path).withWords(values);
   const std::filesystem::path file(path);
-  return (file.parent_path() / (file.stem().string() + values + file.extension().string())).string();
+  return (file.parent_path() / (file.stem().string() + "." + values + file.extension().string())).string();
 }
 
 std::vector<std::string> Wedge::named(std::vector<std::string> arguments, std::size_t index,
                                       const CLI::App& app) const {
+  const bool isSequence = givenTo("--frames", arguments).has_value();
+  const auto own = [&](const std::string& path) { return fileName(path, index, isSequence); };
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     std::string& argument = arguments[i];
     const std::size_t equals = argument.find('=');
     if (argument.starts_with("-o") && argument.size() > 2)
-      argument = "-o" + fileName(argument.substr(2), index);
+      argument = "-o" + own(argument.substr(2));
     else if (equals != std::string::npos && isOption(argument.substr(0, equals), app, isNamedByWedge))
-      argument = argument.substr(0, equals + 1) + fileName(argument.substr(equals + 1), index);
+      argument = argument.substr(0, equals + 1) + own(argument.substr(equals + 1));
     else if (isOption(argument, app, isNamedByWedge) && i + 1 < arguments.size()) {
-      arguments[i + 1] = fileName(arguments[i + 1], index);
+      arguments[i + 1] = own(arguments[i + 1]);
       ++i;
     }
   }

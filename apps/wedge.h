@@ -10,7 +10,7 @@ namespace nephele::apps {
 
 /// A command line that stands for one call for each value of an option, or for each pair of values of two:
 /// --wedge OPTION=VALUES. Values are separated by commas, or by semicolons where they have commas themselves;
-/// FIRST-LAST and FIRST-LASTxSTEP are numbers.
+/// FIRST-LAST and FIRST-LASTxSTEP are numbers. With --frames it stands for a sequence for each of them.
 class Wedge {
  public:
   /// Most calls that a wedge may stand for.
@@ -21,6 +21,9 @@ class Wedge {
   static std::optional<Wedge> taken(std::vector<std::string>& arguments, const CLI::App& app);
 
   std::size_t size() const;
+  /// Refuses a sequence of so many `frames` for each value where there would be too many calls.
+  /// @throws CLI::ValidationError
+  void requireFew(std::size_t frames) const;
   /// Columns of a table of all calls, row by row; nothing for one option.
   std::optional<int> columns() const;
   /// What call `index` has in addition to the others.
@@ -30,7 +33,8 @@ class Wedge {
   /// "seed 3, billow 0.5"
   std::string label(std::size_t index) const;
   /// `arguments` with names of outputs of its own: the number of the call, from 1, where there is a place for
-  /// it, or else the values, as in cloud.billow_0.5.vdb.
+  /// it, or else the values, as in cloud.billow_0.5.vdb. With --frames the place is for the frame, behind the
+  /// values: cloud.billow_0.5.####.vdb.
   std::vector<std::string> named(std::vector<std::string> arguments, std::size_t index,
                                  const CLI::App& app) const;
 
@@ -41,7 +45,7 @@ class Wedge {
     bool isFlag = false;
   };
   const std::string& valueOf(std::size_t axis, std::size_t index) const;
-  std::string fileName(const std::string& path, std::size_t index) const;
+  std::string fileName(const std::string& path, std::size_t index, bool isSequence) const;
 
   std::vector<Axis> axes_;
 };

@@ -33,16 +33,19 @@ void addSeveralCalls(CLI::App& app, CommonOptions& options) {
   app.add_option(
          "--wedge", options.wedges,
          "Make one call for every value of an option, seed=1-12 or billow=0,0.5,1,2, each with outputs "
-         "of its own name; given twice, for every pair. Semicolons separate what has commas.")
+         "of its own name; given twice, for every pair. With --frames, a sequence for every value, of which "
+         "--only and --shard make their part. Semicolons separate what has commas.")
       ->type_name("OPTION=VALUES")
       ->allow_extra_args(false)
       ->group(kSeveralGroup);
   app.add_flag("--skip-existing", options.skipExisting,
                "Keep the outputs of calls that are there, whole and made with the same options.")
       ->group(kSeveralGroup);
-  markOutput(app.add_option(
-                 "--contact-sheet", options.contactSheet,
-                 "All frames, or all values of --wedge, small on one picture (.png), each with its name."))
+  markOutput(
+      app.add_option(
+          "--contact-sheet", options.contactSheet,
+          "All frames, or all values of --wedge (with --frames the middle frame of each), small on one "
+          "picture (.png), each with its name."))
       ->type_name("FILE")
       ->group(kSeveralGroup);
 }

@@ -13,10 +13,11 @@ namespace {
 /// Options by which a call is not what it makes.
 constexpr std::string_view kNotOfCalls[]{"frames", "only", "shard"};
 
-/// Of all inputs together; nothing where the verb chooses nothing by them.
-std::optional<Extent> measured(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
-  if (!calls.variesInputs) return std::nullopt;
-  std::optional<Extent> all;
+/// Of all inputs together, or of those of one sequence after the other; empty where the verb chooses nothing
+/// by them.
+std::vector<Extent> measured(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
+  std::vector<Extent> ranges;
+  if (!calls.variesInputs) return ranges;
   run.beginPart("measure", 0, 0.05);
   for (std::size_t i = 0; i != calls.count; ++i) {
     const Call call = calls.at(i);
@@ -27,11 +28,19 @@ std::optional<Extent> measured(const Verb& verb, const SeveralCalls& calls, Prog
     run.part = call.part;
     run.begin(call.name);
     const Extent one = command.bound.measure(run);
-    all ? all->include(one) : void(all = one);
+    if (calls.rangeOf(i) == ranges.size())
+      ranges.push_back(one);
+    else
+      ranges.back().include(one);
   }
   run.part.reset();
   run.endPart();
-  return all;
+  return ranges;
+}
+
+nlohmann::json described(const Extent& range) {
+  const auto corner = [](const Vec3f& p) { return nlohmann::json{p.x, p.y, p.z}; };
+  return {{"box", {corner(range.box.min), corner(range.box.max)}}, {"longest_side", range.longestSide}};
 }
 
 /// What the call makes, but for streams.
@@ -63,7 +72,7 @@ bool isThere(const Command& command, const std::string& digest, const Run& run) 
 }  // namespace
 
 std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, ProgramRun& run) {
-  const std::optional<Extent> range = measured(verb, calls, run);
+  const std::vector<Extent> ranges = measured(verb, calls, run);
   auto list = nlohmann::json::array();
   std::vector<MadeCall> made;
   std::size_t skipped = 0;
@@ -76,7 +85,8 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       command.parse(call.arguments);
       const double share = 0.95 / double(count);
       run.part = call.part;
-      run.part->range = range;
+      if (!ranges.empty()) run.part->range = ranges[calls.rangeOf(calls.made[i])];
+      const std::optional<Extent> range = run.part->range;
       run.beginPart(call.name, 0.05 + share * double(i), 0.05 + share * double(i + 1));
       run.part->digest = optionsDigest(
           command.app, kNotOfCalls,
@@ -101,11 +111,9 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
   run.part.reset();
   if (skipped > 0) run.note(fmt::format("{} of {} {} were there and whole", skipped, count, calls.word));
   run.stats[calls.list] = std::move(list);
-  if (range)
-    run.stats["range"] = {{"box",
-                           {{range->box.min.x, range->box.min.y, range->box.min.z},
-                            {range->box.max.x, range->box.max.y, range->box.max.z}}},
-                          {"longest_side", range->longestSide}};
+  if (ranges.size() == 1) run.stats["range"] = described(ranges.front());
+  for (std::size_t i = 0; ranges.size() > 1 && i != ranges.size(); ++i)
+    run.stats["ranges"].push_back(described(ranges[i]));
   return made;
 }
 

@@ -14,11 +14,16 @@ struct SeveralCalls {
   std::function<Call(std::size_t)> at;
   /// Which of them to make.
   std::vector<std::size_t> made{};
-  /// Inputs differ, so that what is chosen from them is chosen from all.
+  /// Inputs differ, so that what is chosen from them is chosen from all; or from so many calls in turn, where
+  /// they are several sequences.
   bool variesInputs = false;
+  std::size_t perRange = 0;
   /// What --stats calls their list, and what messages call them: "frames"
   std::string list, word;
   bool skipExisting = false;
+
+  /// The number of the range that call `i` chooses from.
+  std::size_t rangeOf(std::size_t i) const { return perRange == 0 ? 0 : i / perRange; }
 };
 
 /// A call that was made: what it wrote, "" where it did not, and the look that was asked for.

@@ -172,6 +172,14 @@ std::string FramePattern::path(int frame) const {
   return fmt::format("{}{:0{}d}{}", before_, frame, width_, after_);
 }
 
+std::string FramePattern::withWords(const std::string& words) const {
+  const std::size_t slash = before_.rfind('/'), start = slash == std::string::npos ? 0 : slash + 1;
+  const std::size_t last = before_.find_last_not_of("._-");
+  const std::size_t end = last == std::string::npos ? start : std::max(last + 1, start);
+  return before_.substr(0, end) + (end == start ? "" : ".") + words + (end == before_.size() ? "." : "") +
+         text_.substr(end);
+}
+
 std::string FramePattern::folder() const {
   const std::string folder = std::filesystem::path(text_).parent_path().string();
   return folder.empty() ? "." : folder;

@@ -48,6 +48,8 @@ class FramePattern {
   static int places(const std::string& text);
 
   std::string path(int frame) const;
+  /// The name of another sequence, with `words` before the number: cloud.words.####.exr of cloud.####.exr.
+  std::string withWords(const std::string& words) const;
   /// The folder of all frames, "." if none was given.
   std::string folder() const;
   const std::string& text() const { return text_; }

@@ -153,6 +153,81 @@ TEST_F(Wedges, KeepWhatIsWhole) {
   EXPECT_NE(result.errors.find("smoke"), std::string::npos) << result.errors;
 }
 
+// A sequence for each value, each as a call of its own makes it.
+TEST_F(Wedges, OfSequencesMakeEveryFrameOfEveryValue) {
+  const auto moving = [&](const std::string& output, const std::string& options) {
+    succeeds(fmt::format(
+        "cloud {} -o '{}' --resolution 24 --layers 1 --noise-time 0 --noise-speed 0.3 --frames 1-3 "
+        "--stats '{}' {}",
+        ownData("data/sphere_uv.obj"), file(output), file("s.json"), options));
+  };
+  moving("c.####.vdb", "--wedge seed=1,2 --contact-sheet '" + file("t.png") + "'");
+  const auto calls = wedge();
+  ASSERT_EQ(calls.size(), 6u);
+  // Value times frames, plus frame.
+  EXPECT_EQ(calls[4]["name"], "seed 2, frame 2");
+  EXPECT_EQ(calls[4]["frame"], 2);
+  EXPECT_EQ(calls[4]["values"], (nlohmann::json{{"seed", "2"}}));
+  // One picture for each value.
+  EXPECT_EQ(readImage(file("t.png")).width, 2 * 640 + 3 * 4);
+  const auto values = [&](const std::string& name) { return toBricks(readScalarGrid(file(name)))->values(); };
+  EXPECT_NE(values("c.seed_1.0002.vdb"), values("c.seed_2.0002.vdb"));
+  EXPECT_NE(values("c.seed_2.0001.vdb"), values("c.seed_2.0002.vdb"));
+  moving("own.####.vdb", "--seed 2");
+  for (const char* frame : {"0001.vdb", "0002.vdb", "0003.vdb"})
+    EXPECT_EQ(values(std::string("own.") + frame), values(std::string("c.seed_2.") + frame)) << frame;
+  // The ball, six clouds, the sheet, the statistics and three more clouds.
+  EXPECT_EQ(folder.entryCount(), 12u);
+  // What is there stays; parts are parts of every sequence.
+  fs::remove(file("c.seed_1.0003.vdb"));
+  moving("c.####.vdb", "--wedge seed=1,2 --skip-existing --only 2-3");
+  std::string skipped;
+  const auto rest = wedge();
+  for (const auto& call : rest) skipped += call["skipped"] == true ? 's' : 'm';
+  EXPECT_EQ(skipped, "smss");
+  moving("d.####.vdb", "--wedge seed=1,2 --shard 2/2");
+  EXPECT_TRUE(fs::exists(file("d.seed_1.0002.vdb")) && fs::exists(file("d.seed_2.0002.vdb")));
+  EXPECT_EQ(folder.entryCount(), 14u);
+}
+
+// Camera and extinction of a value are those of all its frames.
+TEST_F(Wedges, OfRenderedSequencesChooseOnceForEveryValue) {
+  for (int frame = 1; frame <= 3; ++frame)
+    writeVdbFile(file(fmt::format("b.{:04d}.vdb", frame)),
+                 {toVdb(*ball(0.25f + 0.25f * float(frame), 0.1f, float(frame)),
+                        {"density", VdbGridInfo::Class::fogVolume})},
+                 {});
+  const auto render = [&](const std::string& output, const std::string& options) {
+    succeeds(fmt::format(
+        "render '{}' -o '{}' --frames 1-3 --size 48x32 --samples 1 --quality draft --stats '{}' {}",
+        file("b.####.vdb"), file(output), file("s.json"), options));
+  };
+  const std::string sheet = " --contact-sheet '" + file("t.png") + "'";
+  render("r.####.exr", "--wedge density-scale=1,4 --wedge 'view=25,0;100,10;0,80'" + sheet);
+  const auto calls = wedge();
+  ASSERT_EQ(calls.size(), 18u);
+  EXPECT_EQ(calls[0]["extinction"], calls[2]["extinction"]);
+  EXPECT_NE(calls[0]["extinction"], calls[9]["extinction"]);
+  // Three columns of views, of the middle frames.
+  const Image table = readImage(file("t.png"));
+  EXPECT_EQ(table.width, 3 * 48 + 4 * 4);
+  EXPECT_EQ(table.height, 2 * (32 + 14) + 3 * 4);
+  EXPECT_TRUE(fs::exists(file("r.density-scale_4.view_100_10.0003.png")));
+  render("own.####.exr", "--density-scale 4 --view 100,10");
+  for (const char* frame : {"1", "2", "3"}) {
+    const Image own = readImage(file(fmt::format("own.000{}.exr", frame))),
+                one = readImage(file(fmt::format("r.density-scale_4.view_100_10.000{}.exr", frame)));
+    for (const char* name : {"R", "G", "B", "A", "Z"})
+      EXPECT_EQ(own.channel(name).values, one.channel(name).values) << frame << name;
+  }
+  // An input is missing where only the last value has it.
+  const ProgramResult result =
+      runProgram(fmt::format("render '{}' -o '{}' --frames 1-3 --wedge 'object={};{}'", file("b.####.vdb"),
+                             file("o.####.exr"), ownData("data/sphere_uv.obj"), file("none.#.obj")));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("none.#.obj: 3 of 3 frames are missing"), std::string::npos) << result.errors;
+}
+
 TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
   refuses(cloud("--wedge seed=1-10000"), "10000 calls are more than 1000");
   refuses(cloud("--wedge seed=1-100 --wedge billow=1-100"), "10000 calls are more than 1000");
@@ -170,7 +245,14 @@ TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
   // Also a value that only the last call would have.
   refuses(cloud("--wedge seed=1,2,x"), "--seed: got 'x'");
   refuses(cloud("--wedge half=true,yes"), "it is a flag");
-  refuses(cloud("--wedge seed=1,2 --frames 1-3"), "call once for each value");
+  refuses(cloud("--wedge seed=1,2 --frames 1-3"), "a place for the frame number");
+  refuses(cloud("--wedge seed=1,2 --frames 1-3").replace(cloud("").find("c.vdb"), 5, "c.####.vdb") +
+              " --wedge frames=1,2",
+          "not an option");
+  refuses(cloud("--wedge seed=1-21 --frames 1-48").replace(cloud("").find("c.vdb"), 5, "c.####.vdb"),
+          "48 frames of 21 values are 1008 calls, more than 1000");
+  refuses(cloud("--wedge seed=1,x --frames 1-2").replace(cloud("").find("c.vdb"), 5, "c.####.vdb"),
+          "--seed: got 'x'");
   refuses(fmt::format("render '{}' --deep '{}' --wedge fov=20,30 --contact-sheet '{}'", file("ball.vdb"),
                       file("d.exr"), file("t.png")),
           "shows previews, volumes and meshes");

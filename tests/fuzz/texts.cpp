@@ -17,6 +17,7 @@
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
+#include "nephele/render/image/frame_range.h"
 #include "nephele/render/scene/camera_file.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
@@ -169,6 +170,12 @@ void useFieldTexts(const Input& input) {
     std::set<std::string> names;
     for (std::size_t i = 0; i != wedge->size(); ++i) names.insert(wedge->named(words, i, app)[1]);
     expect(names.size() == wedge->size(), "two calls of a wedge write the same file");
+    names.clear();
+    words = {"-o", "a_####.vdb", "--frames", "1-2"};
+    for (std::size_t i = 0; i != wedge->size(); ++i)
+      for (const int frame : {1, 2})
+        names.insert(FramePattern::parse(wedge->named(words, i, app)[1]).path(frame));
+    expect(names.size() == 2 * wedge->size(), "two frames of a wedge are the same file");
   });
   std::vector<std::string> lines;
   for (std::size_t begin = 0; begin < text.size();) {

@@ -88,6 +88,15 @@ TEST(FrameRange, SharesPartitionTheFrames) {
   EXPECT_THROW(range.shard(3, 2), Error);
 }
 
+TEST(FramePattern, PutsWordsBeforeTheNumber) {
+  const auto named = [](const char* text) { return FramePattern::parse(text).withWords("fov_20"); };
+  EXPECT_EQ(named("a.####.exr"), "a.fov_20.####.exr");
+  EXPECT_EQ(named("b.c/a_%04d.exr"), "b.c/a.fov_20_%04d.exr");
+  EXPECT_EQ(named("a$F4.exr"), "a.fov_20.$F4.exr");
+  EXPECT_EQ(named("_/####.exr"), "_/fov_20.####.exr");
+  EXPECT_EQ(named("b/-#.exr"), "b/fov_20-#.exr");
+}
+
 TEST(FramePattern, PutsTheNumberInItsPlace) {
   EXPECT_EQ(FramePattern::parse("a.####.exr").path(7), "a.0007.exr");
   EXPECT_EQ(FramePattern::parse("a.%04d.exr").path(7), "a.0007.exr");
