@@ -58,7 +58,7 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
     moments_ = legendreMoments(medium.phase);
     // All colours are solved for on the same lattice.
     const float albedo = std::max({meanAlbedo.x, meanAlbedo.y, meanAlbedo.z});
-    solver_ = solver_.finerWhereDeep(volume, {scene.extinction, albedo, moments_});
+    solver_ = solver_.suitedTo(volume, {scene.extinction, albedo, moments_});
   }
   // Samples that are to be given back are, before the light takes its memory.
   if (readsCodes()) volume.coded();

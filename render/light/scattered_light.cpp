@@ -43,6 +43,10 @@ namespace {
 constexpr float kDeepestCell = 2.0f;
 // Where cells are so many times as deep, they are smaller by this.
 constexpr float kFinerBeyond = 2.0f, kFiner = 1.3f;
+// Below this depth of a cell most of what is sent on is seen before it is scattered again. At four times
+// that, all directions are no better.
+constexpr float kThinCell = 0.5f;
+constexpr int kMostOrder = 8;
 // Moments below this are not worth a degree.
 constexpr float kSmallMoment = 0.1f;
 
@@ -206,14 +210,18 @@ float ScatteredLight::meanAt(const Vec3f& world) const {
   return detail::LatticePoint(size_, worldToLattice_(world)).of(mean().data());
 }
 
-ScatteredLight::Options ScatteredLight::Options::finerWhereDeep(const RenderVolume& volume,
-                                                                const Scattering& scattering) const {
+ScatteredLight::Options ScatteredLight::Options::suitedTo(const RenderVolume& volume,
+                                                          const Scattering& scattering) const {
   Options result = *this;
   if (volume.isEmpty()) return result;
   const SmoothScattering smooth(scattering.phase, scattering.albedo, degree(scattering.phase));
   const float depth = scattering.extinction * smooth.share * volume.density().voxelSize() *
                       detail::LatticePlacement(volume, longestSide).voxelsPerCell() * volume.typicalDensity();
   if (depth > kFinerBeyond * kDeepestCell) result.longestSide = int(kFiner * float(longestSide));
+  const std::vector<float>& phase = scattering.phase;
+  const std::size_t next = std::size_t(mostDegree(order)) + 1;
+  if (depth < kThinCell && next < phase.size() && std::abs(phase[next]) > kSmallMoment)
+    result.order = kMostOrder;
   return result;
 }
 
@@ -227,7 +235,7 @@ float ScatteredLight::leastExtinction(const RenderVolume& volume, const Options&
 
 ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, const Options& options) {
   if (volume.isEmpty()) return {};
-  // Of the finer ones that deep cells need.
+  // Of the finer ones that deep cells need; more directions, of thin ones, take less.
   const detail::LatticePlacement place(volume, int(kFiner * float(options.longestSide)));
   const double moments = detail::momentCount(mostDegree(options.order));
   const double sampled = place.sampledCells(), kept = std::pow(0.125, place.halvings), nodes = kept * sampled,

@@ -72,8 +72,9 @@ class ScatteredLight {
     /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
     /// of the directions.
     int degree(const std::vector<float>& phase) const;
-    /// These, with cells three quarters as wide where they would be so deep that thinning them shows.
-    Options finerWhereDeep(const RenderVolume& volume, const Scattering& scattering) const;
+    /// These, with cells three quarters as wide where they would be so deep that thinning them shows, and
+    /// with all directions where light keeps its way: through thin cells, scattered forward.
+    Options suitedTo(const RenderVolume& volume, const Scattering& scattering) const;
   };
 
   /// From where ScatteredSource::sky is asked for radiance.

@@ -158,10 +158,18 @@ TEST(ScatteredLight, TakesFinerCellsWhereTheyAreDeep) {
   // 0.06 times the extinction.
   const RenderVolume volume(ball(1.0f, 0.06f));
   const ScatteredLight::Options usual;
-  EXPECT_EQ(usual.finerWhereDeep(volume, scattering(2.0f, 0.9f, 0.0f)).longestSide, usual.longestSide);
-  const int finer = usual.finerWhereDeep(volume, scattering(2000.0f, 0.9f, 0.0f)).longestSide;
+  EXPECT_EQ(usual.suitedTo(volume, scattering(2.0f, 0.9f, 0.0f)).longestSide, usual.longestSide);
+  const int finer = usual.suitedTo(volume, scattering(2000.0f, 0.9f, 0.0f)).longestSide;
   EXPECT_GT(finer, usual.longestSide);
   EXPECT_LT(finer, 3 * usual.longestSide / 2);
+}
+
+TEST(ScatteredLight, TakesMoreDirectionsWhereLightKeepsItsWay) {
+  const RenderVolume volume(ball(1.0f, 0.06f));
+  const ScatteredLight::Options usual;
+  EXPECT_EQ(usual.suitedTo(volume, scattering(2.0f, 0.9f, 0.85f)).order, 8);
+  EXPECT_EQ(usual.suitedTo(volume, scattering(200.0f, 0.9f, 0.85f)).order, usual.order);
+  EXPECT_EQ(usual.suitedTo(volume, scattering(2.0f, 0.9f, 0.3f)).order, usual.order);
 }
 
 TEST(ScatteredLight, ConvergesQuicklyWhereForwardScatteringCoversManyCells) {
