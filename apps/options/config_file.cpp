@@ -99,15 +99,18 @@ std::vector<Setting> settingsOf(const ConfiguredVerb& verb, TomlFile& file,
       if (!isGiven(setting.option, arguments)) settings.push_back(std::move(setting));
     });
   };
+  const auto refuseTable = [&](const toml::key& key) {
+    file.collect([&] {
+      file.refuseKey(key, std::string(key.str()), "neither an option nor a verb", verb.verbs, false);
+    });
+  };
   for (const auto& [key, value] : file.table()) {
     if (!value.is_table()) {
       take(key, value);
     } else if (key.str() == verb.name) {
       for (const auto& [inner, own] : *value.as_table()) take(inner, own);
     } else if (std::ranges::count(verb.verbs, key.str()) == 0) {
-      file.collect([&] {
-        file.refuseKey(key, std::string(key.str()), "neither an option nor a verb", verb.verbs, false);
-      });
+      refuseTable(key);
     }
   }
   file.throwFaults();

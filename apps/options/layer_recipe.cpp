@@ -130,8 +130,10 @@ SpectrumOptions spectrumOf(const Entry& table) {
     if (key == "resolution") return void(spectrum.resolution = entry.count(16, 512));
     entry.refuseKey("a spectrum", {"exponent", "lowest", "highest", "tile", "resolution"});
   };
-  for (const auto& [name, value] : *keys)
-    table.file().collect([&] { set(Entry(table.file(), name, value)); });
+  for (const auto& [name, value] : *keys) {
+    const Entry entry(table.file(), name, value);
+    table.file().collect([&] { set(entry); });
+  }
   return spectrum;
 }
 
@@ -161,7 +163,10 @@ LayerRecipe recipeOf(TomlFile& file, const toml::table& table) {
   LayerRecipe layer;
   layer.place = "--recipe: " + file.placeOf(table);
   layer.text = (std::ostringstream() << table).str();
-  for (const auto& [name, value] : table) file.collect([&] { set(layer, Entry(file, name, value)); });
+  for (const auto& [name, value] : table) {
+    const Entry entry(file, name, value);
+    file.collect([&] { set(layer, entry); });
+  }
   const auto needs = [&](const char* key, const char* other) {
     if (const auto found = table.find(key); found != table.end() && !table.contains(other))
       file.collect([&] {
@@ -223,11 +228,11 @@ void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, F
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
   TomlFile file = TomlFile::read("--recipe", path);
   std::vector<LayerRecipe> layers;
-  for (const auto& [name, value] : file.table())
+  for (const auto& [name, value] : file.table()) {
+    const Entry entry(file, name, value);
     file.collect([&] {
-      const Entry entry(file, name, value);
       if (entry.key != "layer") entry.refuseKey("a recipe", {"layer"});
-      const toml::array* tables = value.as_array();
+      const toml::array* tables = entry.value().as_array();
       if (!tables || !tables->is_homogeneous<toml::table>())
         entry.refuse("is a list of tables, each below a line [[layer]]", felt::Code::wrongType);
       for (const toml::node& table : *tables) {
@@ -237,6 +242,7 @@ std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
         layers.push_back(recipeOf(file, *table.as_table()));
       }
     });
+  }
   file.throwFaults();
   if (layers.empty()) throw CLI::ValidationError("--recipe", path + ": has no [[layer]]");
   return layers;
