@@ -20,6 +20,7 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
+#include "nephele/render/session/picture_stages.h"
 
 namespace nephele::apps {
 namespace {
@@ -58,14 +59,14 @@ class FrameMaker {
 
   void prepare(const TurntableFrame& frame, Run& run) {
     if (!scene_.isOf(frame)) {
-      // It refers to the volume.
-      light_.reset();
+      // They refer to the volume.
+      stages_.forget();
       scene_.turnTo(frame, run);
       scene_.requireMemory(start_, run);
     }
     sampleFor(camera(frame.number), run);
     const PictureOptions& picture = scene_.picture();
-    if (!picture.pathTraced && !turntable_.lightsMove()) makeLight(picture.lights, run);
+    if (!picture.pathTraced && !turntable_.lightsMove()) makeLight(picture.lights, "still", run);
     isReady_ = true;
   }
 
@@ -91,11 +92,13 @@ class FrameMaker {
       if (picture.shutter.isInstant()) own.render.nextCamera = turntable_.camera(start_, frame + 1);
       return own.picture(scene_.volume(), camera, progress);
     }
-    if (turntable_.lightsMove() || !light_) makeLight(turntable_.lights(picture.lights, frame), progress);
+    const LitVolume& light =
+        makeLight(turntable_.lights(picture.lights, frame),
+                  turntable_.lightsMove() ? fmt::format("frame {}", frame) : "still", progress);
     RenderOptions options = picture.marched(camera);
     options.holdout = holdout;
     if (picture.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
-    return light_->render(camera, options, progress);
+    return light.render(camera, options, progress);
   }
 
   double lightSeconds() const { return lightSeconds_; }
@@ -106,24 +109,27 @@ class FrameMaker {
   void sampleFor(const Camera& camera, const Progress& progress) {
     const std::optional<float> voxelSize = scene_.otherVoxels(camera, progress);
     if (!voxelSize) return;
-    light_.reset();
+    stages_.forget();
     scene_.resample(*voxelSize, progress);
     scene_.requireMemory(camera, run_);
   }
 
-  void makeLight(const Lights& lights, const Progress& progress) {
+  // The light under these, which are called so, unless it is there.
+  const LitVolume& makeLight(const Lights& lights, const std::string& key, const Progress& progress) {
     const PictureOptions& picture = scene_.picture();
-    light_ = light_ ? light_->underOther(lights, progress)
-                    : LitVolume(scene_.volume(), picture.medium, lights, picture.render.octaves, progress,
-                                picture.render.surfaces);
-    lightSeconds_ += light_->lightSeconds();
+    const bool isThere = stages_.isLit({"", "", "", "", key});
+    stages_.volume("", std::shared_ptr<const RenderVolume>(std::shared_ptr<void>(), &scene_.volume()));
+    const auto lit = stages_.light(
+        "", key, {picture.medium, lights, picture.render.octaves, picture.render.surfaces}, progress);
+    if (!isThere) lightSeconds_ += lit->light.lightSeconds();
+    return lit->light;
   }
 
   TurntableScene& scene_;
   const Turntable& turntable_;
   const Camera& start_;
   const Run& run_;
-  std::optional<LitVolume> light_;
+  PictureStages stages_;
   bool isReady_ = false;
   double lightSeconds_ = 0;
 };

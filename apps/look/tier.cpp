@@ -9,21 +9,51 @@
 #include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
+#include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
 namespace {
 
+constexpr const char* kSamples = ";samples";
+
+/// A density as the march reads it: its samples may have been given back.
+ScalarField codedField(const RenderVolume& volume) {
+  const BrickGrid& grid = volume.density();
+  const CodedBricks codes = volume.coded();
+  const Affine toIndex = grid.worldToIndex();
+  const Vec3i first = grid.firstBrick() * BrickGrid::kBrick, count = grid.brickCount();
+  return functionField([=](const Vec3f& world) {
+    const Vec3f at = toIndex(world) - Vec3f(first);
+    const Vec3i cell{int(std::floor(at.x)), int(std::floor(at.y)), int(std::floor(at.z))};
+    for (int axis = 0; axis != 3; ++axis)
+      if (cell[axis] < 0 || cell[axis] >= BrickGrid::kBrick * count[axis]) return 0.0f;
+    const Vec3i brick = cell / BrickGrid::kBrick, node = cell - brick * BrickGrid::kBrick;
+    const auto place = std::size_t((brick.z * count.y + brick.y) * count.x + brick.x);
+    float sum = 0;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3i step{corner & 1, corner >> 1 & 1, corner >> 2};
+      float share = 1;
+      for (int axis = 0; axis != 3; ++axis) {
+        const float along = at[axis] - float(cell[axis]);
+        share *= step[axis] ? along : 1 - along;
+      }
+      sum += share * codes.at(place, node + step);
+    }
+    return sum;
+  });
+}
+
 /// The same density on voxels that make a quick picture of it.
 RenderVolume coarser(const RenderVolume& volume, Run& run) {
   const BrickGrid& grid = volume.density();
   const float longest = volume.worldBounds().longestSide();
   const float voxel = std::max(grid.voxelSize(), longest / LookPlan::kCoarseVoxels);
-  // Keeps the grid for as long as the field is asked.
-  const std::shared_ptr<const BrickGrid> kept(std::shared_ptr<void>(), &grid);
+  // Ranges of what it holds are as they were.
+  const ScalarField density = withRangesOf(grid, codedField(volume));
   run.begin("coarse density");
-  return RenderVolume(bakeGrid(max(gridField(kept), 0.0f),
+  return RenderVolume(bakeGrid(max(density, 0.0f),
                                {.voxelSize = voxel, .box = volume.worldBounds(), .background = 0.0f}, run));
 }
 
@@ -61,6 +91,7 @@ PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
   if (reach != reaches_.end()) keys.levels += reach->second;
   if (plan.subject.kind == LookSubject::Kind::script && keys.volume == voxelsKey_)
     keys.volume += fmt::format("voxels={:g}", voxels_);
+  if (keys.volume + kSamples == samplesKey_) keys.volume = samplesKey_;
   return keys;
 }
 
@@ -136,6 +167,8 @@ std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookT
     if (plan.what == LookShow::What::wisps) return wispsOf(plan, tier_, run);
     if (finer) return coarser(*finer->volume(plan, nullptr, run), run);
     PictureOptions picture = plan.picture;
+    // What needs the samples of a file beside its codes.
+    if (key == samplesKey_) picture.render.aovs = {"normal"};
     return plan.scene.volume(picture, run);
   });
 }
@@ -179,8 +212,11 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
     chooseVoxels(plan, picture, frame.samples == 0, finer, run);
     (finer ? finer : this)->script(plan, run).suggestTo(picture);
   }
-  if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   picture.render.aovs = frame.show.layers();
+  const bool needsSamples = !picture.readsCodes() || !frame.show.isVolume();
+  if (plan.subject.kind == LookSubject::Kind::volume && needsSamples && !finer)
+    samplesKey_ = plan.keys(tier_).volume + kSamples;
+  if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   std::shared_ptr<const LitCloud> lit;
   if (isLit(plan)) {
     lit = stages_.lit();

@@ -59,6 +59,8 @@ class LookTier {
   // Of the script, and of its voxels, which depend on the camera.
   std::string scriptKey_, voxelsKey_;
   float voxels_ = 0;
+  // Of a volume of a file that something has needed the samples of; they are held from then on.
+  std::string samplesKey_;
   // Whether the stages are those of a cloud that is grown.
   bool isGrown_ = false;
   // How far layers reach, by the keys of shape, layers and volume.

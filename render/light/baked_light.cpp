@@ -28,7 +28,7 @@ float largestMoment(const Phase& phase) {
 }  // namespace
 
 BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
-                       const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
+                       const Octaves& itsOctaves, const SkyPart* before, const Progress& progress,
                        const Surfaces* surfaces)
     : source(&volume),
       medium(itsMedium),
@@ -93,6 +93,11 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   scatter(before, progress);
   for (std::size_t i = 0; i != locals.size(); ++i) addLocal(lights.locals[i], locals[i]);
   code();
+}
+
+SkyPart BakedLight::skyPart() const {
+  return {
+      lights.sky, sky, scene.skyParts, scene.colours, {scattered.end() - scene.skyParts, scattered.end()}};
 }
 
 // Whether all light can be made of a density that is coded.
@@ -225,7 +230,7 @@ void BakedLight::setColours(const RenderVolume& volume, float most) {
 
 // Sets what light does after its first scattering; the sky's part is that of `before` where skies are
 // equal.
-void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
+void BakedLight::scatter(const SkyPart* before, const Progress& progress) {
   const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3;
   const bool once = octaves.count == 1;
   forward = once ? ForwardLight(medium.phase)
@@ -247,9 +252,8 @@ void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
     }
   const std::vector<ScatteredSource> skies = partsOfSky();
   scene.skyParts = int(skies.size());
-  const bool isSkyAsBefore = before && before->lights.sky == lights.sky && before->sky == sky &&
-                             before->scene.skyParts == scene.skyParts &&
-                             before->scene.colours == scene.colours;
+  const bool isSkyAsBefore = before && before->radiance == lights.sky && before->map == sky &&
+                             before->parts == scene.skyParts && before->colours == scene.colours;
   for (std::size_t part = 0; part != skies.size(); ++part) {
     from.emplace_back();
     const int colour = colours == 1 ? 0 : int(part), like = sky ? colour : colourLike(colour, {1, 1, 1});
@@ -258,9 +262,7 @@ void BakedLight::scatter(const BakedLight* before, const Progress& progress) {
     if (like == colour) solves.push_back({colour, once ? 0 : meanAlbedo[colour], skies[part]});
   }
   scattered.assign(from.size(), nullptr);
-  if (isSkyAsBefore)
-    std::copy(before->scattered.end() - scene.skyParts, before->scattered.end(),
-              scattered.end() - scene.skyParts);
+  if (isSkyAsBefore) std::ranges::copy(before->scattered, scattered.end() - scene.skyParts);
   const std::size_t glowsFrom = solves.size();
   if (source->hasEmission() && !once && meanAlbedo != Vec3f{})
     for (int c = 0; c != scene.colours; ++c) solves.push_back({c, meanAlbedo[c], sourceOfGlow(c)});

@@ -19,15 +19,25 @@
 
 namespace nephele::detail {
 
+/// The sky's part of a light, which another one of the same volume and medium takes where its sky is equal.
+struct SkyPart {
+  Vec3f radiance;
+  std::optional<Environment> map;
+  int parts, colours;
+  std::vector<std::shared_ptr<const ScatteredLight>> scattered;
+};
+
 /// A volume, its medium and the light in it, tied together for the kernels: all that does not depend on the
 /// camera.
 struct BakedLight {
-  /// `before`, if there is one, lends the sky's part where skies are equal. Keeps a reference to `volume`.
+  /// `before`: of the light before, if there was one. Keeps a reference to `volume`.
   BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
-             const Octaves& itsOctaves, const BakedLight* before, const Progress& progress,
+             const Octaves& itsOctaves, const SkyPart* before, const Progress& progress,
              const Surfaces* surfaces);
   BakedLight(const BakedLight&) = delete;
   BakedLight& operator=(const BakedLight&) = delete;
+
+  SkyPart skyPart() const;
 
   const RenderVolume* source;
   Medium medium;
@@ -74,7 +84,7 @@ struct BakedLight {
   bool readsCodes() const;
   void code();
   void setColours(const RenderVolume& volume, float most);
-  void scatter(const BakedLight* before, const Progress& progress);
+  void scatter(const SkyPart* before, const Progress& progress);
   // What is solved for: light of one colour `from` somewhere.
   struct Solve {
     int colour;

@@ -77,29 +77,35 @@ LitVolume::LitVolume(const RenderVolume& volume, const Medium& medium, const Lig
                      const Octaves& octaves, const Progress& progress,
                      std::shared_ptr<const Surfaces> surfaces)
     : volume_(&volume), medium_(medium), octaves_(octaves), surfaces_(std::move(surfaces)) {
-  light(lights, progress);
+  relight(lights, progress);
 }
 
 LitVolume LitVolume::underOther(const Lights& lights, const Progress& progress) const {
   LitVolume other = *this;
-  other.light(lights, progress);
+  other.relight(lights, progress);
   return other;
 }
 
-void LitVolume::light(const Lights& lights, const Progress& progress) {
+void LitVolume::relight(const Lights& lights, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  lights_ = lights;
-  RenderScene::check(*volume_, medium_, lights_, surfaces_.get());
+  RenderScene::check(*volume_, medium_, lights, surfaces_.get());
   detail::MarchIntegrator::check(octaves_);
-  const std::shared_ptr<const detail::BakedLight> before = std::exchange(light_, nullptr);
+  if (light_) skyPart_ = std::make_shared<const detail::SkyPart>(light_->skyPart());
+  lights_ = lights;
+  light_.reset();
+  isLit_ = false;
   lightSeconds_ = 0;
-  if (!isSeen(*volume_, medium_)) return;
-  light_ = std::make_shared<const detail::BakedLight>(*volume_, medium_, lights_, octaves_, before.get(),
-                                                      progress, surfaces_.get());
-  lightSeconds_ = secondsSince(start);
+  if (isSeen(*volume_, medium_)) {
+    light_ = std::make_shared<const detail::BakedLight>(*volume_, medium_, lights_, octaves_, skyPart_.get(),
+                                                        progress, surfaces_.get());
+    lightSeconds_ = secondsSince(start);
+  }
+  skyPart_.reset();
+  isLit_ = true;
 }
 
 std::unique_ptr<Integrator> LitVolume::integrator(const RenderOptions& options) const {
+  require(isLit_, "light: has not been made to its end");
   require(options.octaves == octaves_, "octaves: differ from those that the light was made with");
   require(options.surfaces == surfaces_, "objects: differ from those that the light was made with");
   return std::make_unique<detail::MarchIntegrator>(light_, options);

@@ -33,7 +33,8 @@ RenderResult renderImage(const RenderVolume& volume, const Medium& medium, const
 
 namespace detail {
 struct BakedLight;
-}
+struct SkyPart;
+}  // namespace detail
 
 /// A volume with the light in it, made once, that any number of cameras may look at: renderImage in two
 /// parts. The pictures are the same. Cheap to copy.
@@ -51,8 +52,12 @@ class LitVolume {
   /// The same volume under `lights`. What they have in common with the present ones is not made again: the
   /// sky's part, where only suns differ.
   LitVolume underOther(const Lights& lights, const Progress& progress = silent()) const;
+  /// The same of this itself: what is not in common goes first, so that two lights never stand side by side.
+  /// After an error, or where it was cancelled, there are no pictures until it is called again.
+  void relight(const Lights& lights, const Progress& progress = silent());
 
-  /// @throws Error as renderImage does, or if octaves or objects are not those that the light was made with.
+  /// @throws Error as renderImage does, if octaves or objects are not those that the light was made with, or
+  /// if there is no light, see `relight`.
   /// `lightSeconds` of the result is 0.
   RenderResult render(const Camera& camera, const RenderOptions& options,
                       const Progress& progress = silent()) const;
@@ -68,14 +73,15 @@ class LitVolume {
   double lightSeconds() const { return lightSeconds_; }
 
  private:
-  void light(const Lights& lights, const Progress& progress);
-
   const RenderVolume* volume_;
   Medium medium_;
   Lights lights_;
   Octaves octaves_;
   std::shared_ptr<const Surfaces> surfaces_;
   std::shared_ptr<const detail::BakedLight> light_;
+  // Of a light that is gone.
+  std::shared_ptr<const detail::SkyPart> skyPart_;
+  bool isLit_ = false;
   double lightSeconds_ = 0;
 };
 

@@ -16,8 +16,7 @@ std::string joined(const std::string& before, const std::string& own) {
 
 std::shared_ptr<const Mesh> PictureStages::shape(const std::string& key, const std::function<Mesh()>& read) {
   if (!shape_.isAt(key)) {
-    picture_.forget();
-    light_.forget();
+    forgetLight();
     volume_.forget();
     levels_.forget();
   }
@@ -30,8 +29,7 @@ std::shared_ptr<const CloudLevels> PictureStages::levels(const std::string& key,
   require(shape_.kept() != nullptr, "PictureStages: levels need a shape");
   const std::string whole = joined(shape_.key(), key);
   if (!levels_.isAt(whole)) {
-    picture_.forget();
-    light_.forget();
+    forgetLight();
     volume_.forget();
   }
   return levels_.at(whole, [&] {
@@ -45,10 +43,16 @@ std::shared_ptr<const RenderVolume> PictureStages::volume(const std::string& key
                                                           const std::function<RenderVolume()>& make) {
   const std::string whole = joined(levels_.key(), key);
   if (!volume_.isAt(whole)) {
-    picture_.forget();
-    light_.forget();
+    forgetLight();
   }
   return volume_.at(whole, [&] { return std::make_shared<const RenderVolume>(make()); });
+}
+
+std::shared_ptr<const RenderVolume> PictureStages::volume(const std::string& key,
+                                                          std::shared_ptr<const RenderVolume> held) {
+  const std::string whole = joined(levels_.key(), key);
+  if (!volume_.isAt(whole)) forgetLight();
+  return volume_.at(whole, [&] { return std::move(held); });
 }
 
 std::shared_ptr<const LitCloud> PictureStages::light(const std::string& mediumKey,
@@ -56,17 +60,20 @@ std::shared_ptr<const LitCloud> PictureStages::light(const std::string& mediumKe
                                                      const Progress& progress) {
   require(volume_.kept() != nullptr, "PictureStages: light needs a volume");
   const std::string medium = joined(volume_.key(), mediumKey), whole = joined(medium, lightsKey);
-  if (!light_.isAt(whole)) picture_.forget();
-  if (mediumKey_ != medium) light_.forget();
-  const std::shared_ptr<const LitCloud> result =
-      light_.following(whole, [&](const std::shared_ptr<const LitCloud>& before) {
-        const std::shared_ptr<const RenderVolume>& volume = volume_.kept();
-        return std::make_shared<const LitCloud>(
-            LitCloud{volume, before ? before->light.underOther(setup.lights, progress)
-                                    : LitVolume(*volume, setup.medium, setup.lights, setup.octaves, progress,
-                                                setup.surfaces)});
-      });
+  if (light_.isAt(whole)) return light_.kept();
+  if (light_.kept()) left_ = light_.kept()->light;
+  if (mediumKey_ != medium) left_.reset();
+  picture_.forget();
+  light_.forget();
   mediumKey_ = medium;
+  const auto result = light_.at(whole, [&] {
+    if (left_)
+      left_->relight(setup.lights, progress);
+    else
+      left_.emplace(*volume_.kept(), setup.medium, setup.lights, setup.octaves, progress, setup.surfaces);
+    return std::make_shared<const LitCloud>(LitCloud{volume_.kept(), *left_});
+  });
+  left_.reset();
   return result;
 }
 
@@ -84,9 +91,14 @@ bool PictureStages::isLit(const Keys& keys) const {
   return light_.isAt(joined(joined(joined(levels, keys.volume), keys.medium), keys.lights));
 }
 
-void PictureStages::forget() {
+void PictureStages::forgetLight() {
   picture_.forget();
   light_.forget();
+  left_.reset();
+}
+
+void PictureStages::forget() {
+  forgetLight();
   volume_.forget();
   levels_.forget();
   layers_.forget();

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,12 @@ class PictureStages {
   /// The volume that is looked at, made from the levels, if there are any, or of something else.
   std::shared_ptr<const RenderVolume> volume(const std::string& key,
                                              const std::function<RenderVolume()>& make);
+  /// The same of one that somebody else holds.
+  std::shared_ptr<const RenderVolume> volume(const std::string& key,
+                                             std::shared_ptr<const RenderVolume> held);
   /// The light in the volume; `mediumKey` says what the medium, octaves and surfaces depend on. Where only
-  /// lights have changed, what they have in common with those before is not made again. @throws as LitVolume.
+  /// lights have changed, what they have in common with those before is not made again; the rest goes before
+  /// the new one comes. @throws as LitVolume.
   std::shared_ptr<const LitCloud> light(const std::string& mediumKey, const std::string& lightsKey,
                                         const LightSetup& setup, const Progress& progress = silent());
   /// A picture of it. @throws as LitVolume::render.
@@ -72,14 +77,17 @@ class PictureStages {
   void forget();
 
  private:
+  void forgetLight();
+
   Stage<Mesh> shape_;
   KeptLayers layers_;
   Stage<CloudLevels> levels_;
   Stage<RenderVolume> volume_;
   Stage<LitCloud> light_;
   Stage<RenderResult> picture_;
-  // Of the light that is kept.
+  // Of the light that is kept, or of what is left of one for the next.
   std::string mediumKey_;
+  std::optional<LitVolume> left_;
 };
 
 }  // namespace nephele

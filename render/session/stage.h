@@ -25,16 +25,6 @@ class Stage {
     key_ = key;
     return result_;
   }
-  /// The same where the new result is made from the one before: `make` gets it, or null, and it stays where
-  /// `make` throws.
-  template <class Make>
-  const Result& following(const std::string& key, Make&& make) {
-    if (isAt(key)) return result_;
-    result_ = std::forward<Make>(make)(result_);
-    key_ = key;
-    return result_;
-  }
-
   bool isAt(const std::string& key) const { return result_ && key == key_; }
   /// Null where nothing is kept.
   const Result& kept() const { return result_; }

@@ -441,6 +441,32 @@ TEST(LookVerb, SamplesAScriptForTheCameraThatRests) {
   EXPECT_NEAR(side / voxel, near["voxels"].get<double>(), 1e-3 * side / voxel);
 }
 
+TEST(LookVerb, ShowsAllOfAVolume) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.file("v.vdb");
+  ASSERT_EQ(test::runProgram("cloud " + test::ownData("data/cloud_base.obj") +
+                             " --resolution 48 --layers 1 -o " + file)
+                .exitCode,
+            0);
+  const Viewer viewer({file});
+  const Json beauty = pictureOf(viewer, settings(1));
+  ASSERT_EQ(beauty["type"], "picture") << beauty;
+  // These need more of the file than its light does.
+  Json normal = settings(2);
+  normal["show"] = {{"what", "cloud"}, {"layer", "normal"}};
+  EXPECT_EQ(pictureOf(viewer, normal)["type"], "picture");
+  const Json point = pictureOf(viewer, settings(3, Json::object(), {{"point", Json::array({"0,3,0,2"})}}));
+  EXPECT_EQ(point["type"], "picture") << point;
+  const Json surface = pictureOf(viewer, shown(settings(4), "surface"));
+  ASSERT_EQ(surface["type"], "picture") << surface;
+  for (int axis = 0; axis != 3; ++axis) {
+    const auto side = [&](const Json& of) {
+      return of["bounds"][1][axis].get<double>() - of["bounds"][0][axis].get<double>();
+    };
+    EXPECT_GT(side(surface), 0.85 * side(beauty)) << axis;
+  }
+}
+
 TEST(LookVerb, ShowsThePiecesOfACut) {
   const test::TemporaryFolder folder;
   const Viewer viewer({test::ownData("data/cloud_base.obj"), "--show", "pieces", "--plane=0,0.5,0,0,1,0",

@@ -55,6 +55,27 @@ TEST(LitVolume, MayBeLitAgain) {
   }
 }
 
+TEST(LitVolume, IsLitAgainInPlaceAlsoAfterThatWasCancelled) {
+  class Never : public Progress {
+   public:
+    bool cancelled() const override { return true; }
+  };
+  const RenderVolume volume(test::ball(1.0f, 0.2f));
+  const Medium medium{30.0f};
+  const RenderOptions options;
+  const Camera camera = cameraAt(volume, 20);
+  Lights moved = kLights;
+  moved.suns[0].direction = directionTowards(180, 20);
+  LitVolume lit(volume, medium, kLights, options.octaves);
+  const LitVolume copy = lit;
+  EXPECT_THROW(lit.relight(moved, Never()), Cancelled);
+  EXPECT_THROW(lit.render(camera, options), Error);
+  lit.relight(moved);
+  expectSame(lit.render(camera, options).image, renderImage(volume, medium, moved, camera, options).image);
+  // Of others it takes nothing away.
+  expectSame(copy.render(camera, options).image, renderImage(volume, medium, kLights, camera, options).image);
+}
+
 TEST(LitVolume, AnEmptyVolumeMakesPicturesOfZeros) {
   const RenderVolume volume(test::ball(1.0f, 0.25f, 0.0f));
   const RenderOptions options;
