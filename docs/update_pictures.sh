@@ -235,14 +235,15 @@ if [ -n "${DISNEY:-}" ] && picture detail_4k; then
   grow detail.vdb cloud $base --resolution 512 --layers 5 --roughness 0.65 --billow 0.4 --amplitude "2.5%*noise:2x,2:0.6,1.5" --flat-base 3%,6% \
     --edge-thickness "0.4%*noise:3x:0.6,4" --advect "1%*noise:2x:0,1*height:0=1.4,0.6=0.6,1=0.1" --advect-frequency 18x
   files= crops=
-  for volume in coarse.vdb detail.vdb "$DISNEY"; do
+  for volume in coarse.vdb detail.vdb felt/cumulus_detail.felt "$DISNEY"; do
     name=$(basename "$volume" .vdb)
     view="--view 25,0 --sun 100,35"
+    [ "$name" != cumulus_detail.felt ] || view="$view --set mesh=\"$base\""
     show "whole_$name" "$volume" $view --size 480x270
     show "crop_$name" "$volume" $view --size 3840x2160 --crop 1100,620,1580,890
     files="$files whole_$name.png" crops="$crops crop_$name.png"
   done
-  padding=:pad=4 tiles detail_4k.jpg 3x2 $files $crops
+  padding=:pad=4 tiles detail_4k.jpg 4x2 $files $crops
 fi
 
 if picture volumes; then
