@@ -116,6 +116,7 @@ bool Checker::typed(ExpressionPtr& expression, const Type& wanted) {
     case ExpressionKind::percent:
     case ExpressionKind::perSide:
     case ExpressionKind::conversion:
+    case ExpressionKind::targetIndex:
       return true;
     case ExpressionKind::variable:
       return variable(*expression);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/constant_node.h"
@@ -176,7 +177,9 @@ void Interpreter::assignment(const Statement& statement) {
   }
   const Expression& name = *target.parts[0];
   const std::int64_t index = evaluate(*target.parts[1]).as<std::int64_t>();
+  const std::int64_t outer = std::exchange(targetIndex_, index);
   Value value = evaluate(*statement.expressions[1]);
+  targetIndex_ = outer;
   Value& array = variable(name.isGlobal, name.slot);
   const std::int64_t size = array.isSet() ? static_cast<std::int64_t>(array.as<Array>()->size()) : 0;
   if (index < 0 || index > size)
@@ -226,6 +229,8 @@ Value Interpreter::evaluate(const Expression& expression) {
   switch (expression.kind) {
     case ExpressionKind::literal:
       return expression.literal;
+    case ExpressionKind::targetIndex:
+      return targetIndex_;
     case ExpressionKind::percent:
       return expression.literal.as<double>() * longestSide(expression);
     case ExpressionKind::perSide:

@@ -65,6 +65,7 @@ class Interpreter {
   Context& context_;
   std::vector<Value> globals_;
   std::map<int, const Expression*> settings_;
+  std::int64_t targetIndex_ = 0;
   std::vector<Value> locals_;
   std::size_t frame_ = 0;
   const FunctionDeclaration* function_ = nullptr;

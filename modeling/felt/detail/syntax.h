@@ -35,6 +35,8 @@ enum class ExpressionKind {
   array,
   /// Of the only part to the type of the expression; made by the checker.
   conversion,
+  /// The index of the element that is assigned to, which is evaluated once.
+  targetIndex,
 };
 
 struct Expression {

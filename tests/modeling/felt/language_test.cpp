@@ -71,6 +71,11 @@ TEST(FeltLanguage, ArraysGrowAtTheirEndAndAreValues) {
       printed("float[] a = [1, 2.5]; scalarfield[] f = [1, identity().x]; print(a, eval(f[1], (4,0,0)));"),
       "[1, 2.5] 4\n");
   EXPECT_EQ(printed("float[] none = []; print(size(none), none);"), "0 []\n");
+  // The index is evaluated once, whatever is evaluated beside it.
+  EXPECT_EQ(printed("int calls = 0; int[] a = [1, 2, 3]; func int next() { calls += 1; return calls - 1; }\n"
+                    "func int inner() { a[2] += 100; return 10; }\n"
+                    "a[next()] += 5; a[next()] *= inner(); a[next()]++; print(a, calls);"),
+            "[6, 20, 104] 3\n");
 }
 
 TEST(FeltLanguage, FunctionsHaveOverloadsDefaultsAndNames) {
