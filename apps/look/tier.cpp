@@ -161,7 +161,11 @@ std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookT
   }
   if (plan.growsCloud()) {
     const std::unique_ptr<Growing> growing = grown(plan, run);
-    return stages_.volume(key, [&] { return growing->volume(plan, run); });
+    return stages_.volume(key, [&] {
+      RenderVolume made = growing->volume(plan, run);
+      if (tier_ == LookPlan::Tier::fine && key != samplesKey_) made.giveUpSamples();
+      return made;
+    });
   }
   return stages_.volume(key, [&] {
     if (plan.what == LookShow::What::wisps) return wispsOf(plan, tier_, run);
@@ -213,8 +217,9 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
     (finer ? finer : this)->script(plan, run).suggestTo(picture);
   }
   picture.render.aovs = frame.show.layers();
-  const bool needsSamples = !picture.readsCodes() || !frame.show.isVolume();
-  if (plan.subject.kind == LookSubject::Kind::volume && needsSamples && !finer)
+  // The surface of a cloud is that of its levels.
+  const bool needsSamples = !picture.readsCodes() || !(frame.show.isVolume() || plan.growsCloud());
+  if ((plan.subject.kind == LookSubject::Kind::volume || plan.growsCloud()) && needsSamples && !finer)
     samplesKey_ = plan.keys(tier_).volume + kSamples;
   if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   std::shared_ptr<const LitCloud> lit;
