@@ -148,11 +148,17 @@ def plain(name):
     return f"def {name}({known[name]}:\n{documented(text, 4)}    ...\n"
 
 
+def session():
+    kind = nephele.Session
+    return (f"class Session:\n{documented(kind.__doc__, 4)}    def __init__(self, volumes: Union[Volume, List[Volume]], /) -> None: ...\n"
+            f"    def render(self, **options: Any) -> Picture:\n{documented(kind.render.__doc__, 8)}        ...\n")
+
+
 def stubs():
     parts = [HEAD]
     classes = [nephele.Error, nephele.Cancelled, nephele.Domain, nephele.Mesh, nephele.Grid, nephele.Picture,
                nephele.ScalarField, nephele.VectorField, nephele.MatrixField]
-    parts += [class_of(kind) for kind in classes]
+    parts += [class_of(kind) for kind in classes] + [session()]
     rest = [name for name in nephele.__all__ if not inspect.isclass(getattr(nephele, name))]
     parts += [verb(name) if name in _verbs._TEXTS else plain(name) for name in rest]
     parts += [word(name, functions) for name, functions in sorted(_words.overloads().items()) if name not in nephele.__all__]

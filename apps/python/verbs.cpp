@@ -2,6 +2,9 @@
 // would.
 #include <pybind11/stl.h>
 
+#include <mutex>
+#include <utility>
+
 #include "apps/detail/program_run.h"
 #include "apps/manual/option_table.h"
 #include "apps/options/descriptions.h"
@@ -14,20 +17,44 @@
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/felt/diagnostic.h"
+#include "nephele/render/session/picture_stages.h"
 
 namespace nephele::python {
 namespace {
 
 using pybind11::literals::operator""_a;
 
+/// What one call leaves to the next. For several threads: a call that finds it taken does without.
+class Kept {
+ public:
+  Stage<LitCloud> take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(lit_, {});
+  }
+  void put(Stage<LitCloud> lit) {
+    const std::lock_guard lock(mutex_);
+    lit_ = std::move(lit);
+  }
+
+ private:
+  std::mutex mutex_;
+  Stage<LitCloud> lit_;
+};
+
 /// A run that prints nothing: what it has to say goes to a Watch.
 class WatchedRun final : public apps::ProgramRun {
  public:
-  WatchedRun(const std::string& verb, const apps::CommonOptions& options, const Watch& watch)
+  WatchedRun(const std::string& verb, const apps::CommonOptions& options, const Watch& watch, Kept* kept)
       : ProgramRun(verb, quietened(options)),
         watch_(watch),
+        kept_(kept),
         isVerbose_(options.verbose),
-        isQuiet_(options.quiet) {}
+        isQuiet_(options.quiet) {
+    if (kept_) lit = kept_->take();
+  }
+  ~WatchedRun() override {
+    if (kept_) kept_->put(std::move(lit));
+  }
 
   void begin(std::string_view stage) const override {
     ProgramRun::begin(stage);
@@ -51,6 +78,7 @@ class WatchedRun final : public apps::ProgramRun {
   }
 
   const Watch& watch_;
+  Kept* kept_;
   bool isVerbose_, isQuiet_;
 };
 
@@ -59,16 +87,17 @@ py::object toPython(const nlohmann::json& value) {
       value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
-/// Does what the program does for these arguments; returns the statistics.
+/// Does what the program does for these arguments; returns the statistics. Takes from `kept`, if there is
+/// one, and leaves there what the next call may need.
 py::object callVerb(const std::string& verb, const std::vector<std::string>& arguments,
-                    const py::object& progress) {
+                    const py::object& progress, const std::shared_ptr<Kept>& kept) {
   nlohmann::json statistics;
   Watch watch;
   watched(watch, progress, [&] {
     try {
       statistics =
           apps::callVerb(verb, arguments, [&](const std::string& name, const apps::CommonOptions& options) {
-            return std::make_unique<WatchedRun>(name, options, watch);
+            return std::make_unique<WatchedRun>(name, options, watch, kept.get());
           });
     } catch (const CLI::Error& error) {
       throw Error(error.what());
@@ -171,7 +200,9 @@ void addVerbs(py::module_& module) {
     return std::make_shared<MemoryFile>(name, extension);
   });
   module.def("_try_output", [](const std::string& path) { const OutputFile trial(path); });
-  module.def("_call_verb", callVerb);
+  py::class_<Kept, std::shared_ptr<Kept>>(module, "_Kept").def(py::init<>());
+  module.def("_call_verb", callVerb, "verb"_a, "arguments"_a, "progress"_a,
+             "kept"_a = std::shared_ptr<Kept>());
   module.def("_options", optionsOf);
   module.def("_verbs", verbNames);
   module.def("_read_mesh", [](const std::string& path) {

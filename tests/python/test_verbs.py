@@ -302,5 +302,44 @@ class Pictures(Case):
         self.assertIsNone(nephele.Grid(np.ones((4, 4, 4, 3)))._repr_png_())
 
 
+class Sessions(Case):
+    SMALL = dict(size=(32, 24), quality="draft", sky=(0.1, 0.2, 0.3), sun=(90, 38, 3))
+
+    def test_make_the_pictures_of_single_calls_and_keep_the_light(self):
+        fog = fog_grid()
+        session = nephele.Session(fog)
+        lights = []
+        for change in ({}, {"view": (60, 20)}, {"exposure": 1}, {"sun": (10, 20, 3)}, {"sun": (10, 20, 3), "view": (60, 20)}):
+            wanted = nephele.render(fog, **dict(self.SMALL, **change))
+            found, stats = session.render(**dict(self.SMALL, **change), stats=True)
+            np.testing.assert_array_equal(found.array, wanted.array)
+            lights.append(any(stage["name"].startswith("light") or stage["name"] == "scatter" for stage in stats["stages"]))
+        self.assertEqual(lights, [True, False, False, True, False])
+
+    def test_see_objects_as_they_were_and_name_them(self):
+        fog = fog_grid()
+        wanted = nephele.render(fog, **self.SMALL)
+        session = nephele.Session(fog)
+        del fog
+        np.testing.assert_array_equal(session.render(**self.SMALL).array, wanted.array)
+        with self.assertRaisesRegex(nephele.Error, "^volume.*no grid named 'heat'|^volume.*'heat'"):
+            session.render(grid="heat")
+        with self.assertRaises(TypeError):
+            nephele.Session(BALL)
+        with self.assertRaisesRegex(TypeError, "no option 'vieww'"):
+            session.render(vieww=(1, 2))
+
+    def test_may_be_asked_from_several_threads(self):
+        session, pictures = nephele.Session(fog_grid()), {}
+        threads = [threading.Thread(target=lambda i=i: pictures.update({i: session.render(**self.SMALL, view=(30 * (i % 2), 5)).array}))
+                   for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        np.testing.assert_array_equal(pictures[0], pictures[2])
+        np.testing.assert_array_equal(pictures[1], pictures[3])
+
+
 if __name__ == "__main__":
     unittest.main()

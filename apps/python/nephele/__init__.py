@@ -25,6 +25,7 @@ from ._nephele import (
 )
 from ._objects import as_mesh, info, read, write
 from ._verbs import (
+    Session,
     advect,
     cloud,
     cut,
@@ -42,7 +43,8 @@ from ._words import felt, words
 _words.define(globals())
 
 __all__ = [
-    "Cancelled", "Domain", "Error", "Grid", "MatrixField", "Mesh", "Picture", "ScalarField", "VectorField",
+    "Cancelled", "Domain", "Error", "Grid", "MatrixField", "Mesh", "Picture", "ScalarField", "Session",
+    "VectorField",
     "advect", "as_mesh", "cloud", "cut", "felt", "field", "info", "levelset", "mesh", "options", "read", "render",
     "thread_count", "transfer", "transform", "turntable", "wisps", "words", "write",
 ]

@@ -313,6 +313,18 @@ class MatrixField:
     def __neg__(self) -> Any: ...
     def __abs__(self) -> Any: ...
 
+class Session:
+    """Pictures of the same volumes, one after another. `session.render(...)` makes what `render(volumes, ...)`
+    does,
+    and for another camera, size or exposure only marches: volumes and light are kept for as long as the
+    session lives.
+    Objects are seen as they were when it began; scripts, and paths that are traced, begin anew each time.
+    """
+    def __init__(self, volumes: Union[Volume, List[Volume]], /) -> None: ...
+    def render(self, **options: Any) -> Picture:
+        """A picture, with the options of `render`."""
+        ...
+
 def advect(
     what: Any,
     /,

@@ -144,10 +144,10 @@ class _Call:
         self.arguments.append(f"--{option}={file.path}")
         return file
 
-    def run(self, progress):
+    def run(self, progress, kept=None):
         try:
             with _callback(progress) as callback:
-                return _nephele._call_verb(self.verb, self.arguments, callback)
+                return _nephele._call_verb(self.verb, self.arguments, callback, kept)
         except Error as error:
             text = str(error)
             for file, name in self.files:
@@ -164,7 +164,7 @@ def _content(file):
     return content
 
 
-def _made(verb, inputs, extension, named, *, name="output", before=()):
+def _made(verb, inputs, extension, named, *, name="output", before=(), session=None):
     """Runs a verb whose main output stays in memory, and returns that; with what else was asked for by True, a
     tuple."""
     progress = named.pop("progress", None)
@@ -176,6 +176,10 @@ def _made(verb, inputs, extension, named, *, name="output", before=()):
     if several and output is None:
         raise TypeError(f"{verb}: '{several}' makes several files; give output, too")
     call = _Call(verb)
+    kept = None
+    if session is not None:
+        kept = session._kept
+        call.files += session._files
     for option, thing, what in before:
         call.arguments.append(f"--{option}={call.path(thing, what)}")
     for thing, what in inputs:
@@ -188,12 +192,12 @@ def _made(verb, inputs, extension, named, *, name="output", before=()):
             call.add_option(option, value)
     if several:
         call.arguments.append("--output=" + os.fspath(output))
-        return call.run(progress)
+        return call.run(progress, kept)
     if output is not None:
         output = os.fspath(output)
         _nephele._try_output(output)
     main = call.room(name, extension, "output")
-    statistics = call.run(progress)
+    statistics = call.run(progress, kept)
     result = _content(main)
     if output is not None:
         write(output, result)
@@ -244,6 +248,22 @@ def transfer(reference, object, /, **named):
 
 def render(volumes, /, **named):
     return _made("render", _listed(volumes, "volume"), ".exr", named, name="picture")
+
+
+class Session:
+    """Pictures of the same volumes, one after another. `session.render(...)` makes what `render(volumes, ...)` does,
+    and for another camera, size or exposure only marches: volumes and light are kept for as long as the session lives.
+    Objects are seen as they were when it began; scripts, and paths that are traced, begin anew each time."""
+
+    def __init__(self, volumes, /):
+        call = _Call("render")
+        self._inputs = [(call.path(thing, name), name) for thing, name in _listed(volumes, "volume")]
+        self._files = call.files
+        self._kept = _nephele._Kept()
+
+    def render(self, **named):
+        """A picture, with the options of `render`."""
+        return _made("render", self._inputs, ".exr", named, name="picture", session=self)
 
 
 def cut(model, /, **named):
