@@ -86,15 +86,13 @@ void look(const LookArguments& options, Run& run) {
 }  // namespace
 
 Verb lookVerb() {
-  Verb verb =
-      verbOf("look", "Shows the cloud in a browser while it is shaped and lit.",
-             "nephele look data/cloud_base.obj --resolution 256 --sun 90,38", bindOptions, look,
-             "What is looked at comes after these options: a mesh, two meshes, a level set, a volume, a "
-             "script (.felt), a recipe\n"
-             "or a file of options (.toml), or nothing, for a cloud of its own; then any options of "
-             "'nephele render' and of the verb\n"
-             "of what is shown: 'nephele cloud', 'nephele wisps', 'nephele cut' for pieces, 'nephele "
-             "transfer'.\n");
+  Verb verb = verbOf(
+      "look", "Shows the cloud in a browser while it is shaped and lit.",
+      "nephele look data/cloud_base.obj --resolution 256 --sun 90,38", bindOptions, look,
+      R"(What is looked at comes after these options: a mesh, two meshes, a level set, a volume, a script (.felt), a recipe
+or a file of options (.toml), or nothing, for a cloud of its own; then any options of 'nephele render' and of the verb
+of what is shown: 'nephele cloud', 'nephele wisps', 'nephele cut' for pieces, 'nephele transfer'.
+)");
   verb.passesOthersOn = true;
   return verb;
 }

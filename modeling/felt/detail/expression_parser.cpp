@@ -141,6 +141,19 @@ ExpressionPtr ExpressionParser::copyOf(const Expression& from) {
   return copy;
 }
 
+ExpressionPtr ExpressionParser::readAgain(const Expression& target) {
+  ExpressionPtr old = copyOf(target);
+  if (old->kind == ExpressionKind::index) {
+    Expression& index = *old->parts[1];
+    const Span span = index.span;
+    index = Expression{};
+    index.kind = ExpressionKind::targetIndex;
+    index.span = span;
+    index.type = {Kind::integer};
+  }
+  return old;
+}
+
 ExpressionPtr ExpressionParser::expression() {
   const Level level(*this);
   ExpressionPtr first = binary(0);

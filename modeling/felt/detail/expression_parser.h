@@ -49,6 +49,8 @@ class ExpressionParser {
   ExpressionPtr node(ExpressionKind kind, const Span& span, std::string name = {});
   void adopt(Expression& parent, ExpressionPtr part);
   static ExpressionPtr copyOf(const Expression& from);
+  /// What a target holds before it is assigned to.
+  static ExpressionPtr readAgain(const Expression& target);
   ExpressionPtr operation(const Token& mark, const std::string& name, ExpressionPtr a, ExpressionPtr b);
   /// Operators of `kLevels[level]` and tighter.
   ExpressionPtr binary(std::size_t level);

@@ -61,8 +61,6 @@ class Parser : public ExpressionParser {
   [[noreturn]] void unknownType();
   StatementPtr stepped(const Span& begin, ExpressionPtr target, const Token& mark);
   StatementPtr assigned(const Span& begin, ExpressionPtr target, ExpressionPtr value);
-  /// What a target holds before it is assigned to.
-  ExpressionPtr readAgain(const Expression& target);
   Type type(bool mayBeNothing);
   /// A name, with the brackets of an array behind it as C has them.
   DeclaredName declaredName(const Type& type, const std::string& what);
@@ -276,19 +274,6 @@ StatementPtr Parser::stepped(const Span& begin, ExpressionPtr target, const Toke
   ExpressionPtr old = readAgain(*target);
   ExpressionPtr value = operation(mark, mark.text.substr(0, 1), std::move(old), std::move(one));
   return assigned(begin, std::move(target), std::move(value));
-}
-
-ExpressionPtr Parser::readAgain(const Expression& target) {
-  ExpressionPtr old = copyOf(target);
-  if (old->kind == ExpressionKind::index) {
-    Expression& index = *old->parts[1];
-    const Span span = index.span;
-    index = Expression{};
-    index.kind = ExpressionKind::targetIndex;
-    index.span = span;
-    index.type = {Kind::integer};
-  }
-  return old;
 }
 
 StatementPtr Parser::assigned(const Span& begin, ExpressionPtr target, ExpressionPtr value) {
