@@ -10,8 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <utility>
 
 #include "nephele/render/march/detail/lit_steps.h"
 #include "nephele/render/march/detail/local_light.h"

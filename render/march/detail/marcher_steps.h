@@ -9,7 +9,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <utility>
 
 #include "nephele/render/march/detail/marcher.h"
@@ -67,7 +66,7 @@ inline bool Marcher<kColours>::flush() {
   const int used = count_, end = (used + kLanes - 1) / kLanes * kLanes;
   if (used != end) repeatLast();
   count_ = 0;
-  result_.samples += std::uint32_t(used);
+  result_.samples += unsigned(used);
 
   // Optical depths of the steps, and behind them.
   alignas(64) float own[kBlock], after[kBlock];
