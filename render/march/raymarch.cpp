@@ -80,12 +80,6 @@ LitVolume::LitVolume(const RenderVolume& volume, const Medium& medium, const Lig
   relight(lights, progress);
 }
 
-LitVolume LitVolume::underOther(const Lights& lights, const Progress& progress) const {
-  LitVolume other = *this;
-  other.relight(lights, progress);
-  return other;
-}
-
 void LitVolume::relight(const Lights& lights, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   RenderScene::check(*volume_, medium_, lights, surfaces_.get());

@@ -49,11 +49,10 @@ class LitVolume {
   LitVolume(const RenderVolume&&, const Medium&, const Lights&, const Octaves&, const Progress& = silent(),
             std::shared_ptr<const Surfaces> = nullptr) = delete;
 
-  /// The same volume under `lights`. What they have in common with the present ones is not made again: the
-  /// sky's part, where only suns differ.
-  LitVolume underOther(const Lights& lights, const Progress& progress = silent()) const;
-  /// The same of this itself: what is not in common goes first, so that two lights never stand side by side.
-  /// After an error, or where it was cancelled, there are no pictures until it is called again.
+  /// Puts the same volume under `lights`; copies keep theirs. What they have in common with the present ones
+  /// is not made again: the sky's part, where only suns differ. The rest goes first, so that two lights never
+  /// stand side by side. After an error, or where it was cancelled, there are no pictures until it is called
+  /// again.
   void relight(const Lights& lights, const Progress& progress = silent());
 
   /// @throws Error as renderImage does, if octaves or objects are not those that the light was made with, or

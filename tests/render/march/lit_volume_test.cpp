@@ -50,7 +50,7 @@ TEST(LitVolume, MayBeLitAgain) {
   // One light after another, as frames follow each other.
   LitVolume lit(volume, medium, kLights, options.octaves);
   for (const Lights& lights : {moved, other, Lights{kLights.suns, {}}, moved}) {
-    lit = lit.underOther(lights);
+    lit.relight(lights);
     expectSame(lit.render(camera, options).image, renderImage(volume, medium, lights, camera, options).image);
   }
 }
@@ -144,7 +144,7 @@ TEST(LitVolume, HoldsTheShadowsOfObjectsFromPictureToPicture) {
   Lights moved = kLights;
   moved.suns[0].direction = directionTowards(100, 0);
   for (const Lights& lights : {kLights, moved}) {
-    lit = lit.underOther(lights);
+    lit.relight(lights);
     for (const float azimuth : {0.0f, 100.0f})
       expectSame(lit.render(cameraAt(volume, azimuth), options).image,
                  renderImage(volume, medium, lights, cameraAt(volume, azimuth), options).image);
