@@ -90,7 +90,8 @@ class CallError : public Error {
   std::string hint_;
 };
 
-/// A script, or another text of which places can be shown, that cannot be used: all of its faults. `what()` is their text without a line end at the end.
+/// A script, or another text of which places can be shown, that cannot be used: all of its faults. `what()`
+/// is their text without a line end at the end.
 class ScriptError : public Error {
  public:
   ScriptError(std::vector<Diagnostic> diagnostics, const Sources& sources);

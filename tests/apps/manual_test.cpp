@@ -78,8 +78,7 @@ TEST(Manual, CompletesInFish) {
   std::ofstream(script) << runProgram("help --completion fish").output;
   const auto completed = [&](const std::string& line) {
     const std::string command = "HOME=" + folder.file("home") + " fish --no-config -c 'source " + script +
-                                "; complete -C \"" + line + "\" | cut -f1' >" + out +
-                                " 2>&1 </dev/null";
+                                "; complete -C \"" + line + "\" | cut -f1' >" + out + " 2>&1 </dev/null";
     EXPECT_EQ(std::system(command.c_str()), 0) << line;
     return textOf(out);
   };
