@@ -16,9 +16,10 @@ using Names = std::vector<std::string_view>;
 // Options of the verb cloud that say what it grows on.
 const Names kOfShape{"species", "shape-seed", "shape-size", "combine", "blend", "repair", "subdivide"};
 // And those that only what comes after the layers depends on, see cloudEdgeReach for the edge.
-const Names kOfDensity{"half",      "edge-thickness", "density",          "edge-falloff",
-                       "flat-base", "interior-noise", "height-profile",   "thin-out",
-                       "advect",    "advect-steps",   "advect-frequency", "wind"};
+const Names kOfDensity{"half",         "edge-thickness", "edge-variation", "density",
+                       "edge-falloff", "flat-base",      "interior-noise", "height-profile",
+                       "thin-out",     "advect",         "advect-steps",   "advect-frequency",
+                       "wind"};
 // And those that the first layer does not depend on.
 const Names kOfLaterLayers{"lacunarity", "roughness", "billow", "billow-scale"};
 // Options of the verb render.
@@ -226,7 +227,7 @@ std::vector<std::string> LookPlan::layerKeys() const {
   std::string files;
   for (const std::string& file : cloud.maskFiles()) files += fileStamp(file) + ";";
   std::vector<std::string> keys;
-  for (std::size_t i = 0; i < std::size_t(cloud.layerCount()); ++i)
+  for (std::size_t i = 0; i < std::size_t(kMaxCumuloLayers); ++i)
     keys.push_back(files +
                    keyOf(settings["cloud"],
                          [&](const std::string& name) {

@@ -75,11 +75,7 @@ CloudOptions optionsOf(const CloudArguments& cloud, LookPlan::Tier tier, FieldSo
                        const Run& run) {
   CloudOptions options = cloud.resolved(sources, run);
   if (tier == LookPlan::Tier::fine) return options;
-  // The absolute value doubles the frequencies of a noise, and a wave needs two voxels.
-  const float highest = 1 / (4 * options.voxelSize);
-  while (options.layers.size() > 1 &&
-         options.layers.back().frequency * options.layers.back().detail > highest)
-    options.layers.pop_back();
+  options.layers.resize(layersThatShow(options.layers, options.voxelSize));
   return options;
 }
 

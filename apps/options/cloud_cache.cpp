@@ -9,12 +9,16 @@ namespace nephele::apps {
 namespace {
 
 /// What the levels of a cloud do not depend on, or only by the shape, the voxels and the reach of the edge.
-constexpr std::string_view kNotOfLayers[]{
-    "input",      "species",          "shape-seed",     "shape-size", "repair",         "subdivide",
-    "resolution", "voxel-size",       "half",           "density",    "edge-thickness", "edge-falloff",
-    "flat-base",  "interior-noise",   "height-profile", "thin-out",   "advect",         "advect-steps",
-    "cache",      "advect-frequency", "cache-size",     "frames",     "only",           "shard",
-    "wedge",      "combine",          "blend"};
+constexpr std::string_view kNotOfLayers[]{"input",          "species",        "shape-seed",
+                                          "shape-size",     "repair",         "subdivide",
+                                          "resolution",     "voxel-size",     "half",
+                                          "density",        "edge-thickness", "edge-variation",
+                                          "edge-falloff",   "flat-base",      "interior-noise",
+                                          "height-profile", "thin-out",       "advect",
+                                          "advect-steps",   "cache",          "advect-frequency",
+                                          "cache-size",     "frames",         "only",
+                                          "shard",          "wedge",          "combine",
+                                          "blend"};
 
 std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const CloudOptions& options, Run& run) {
   ContentHash hash;

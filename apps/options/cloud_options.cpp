@@ -13,24 +13,39 @@ double CloudArguments::voxel(double longestSide) const {
 }
 
 int CloudArguments::layerCount() const {
-  return recipe.empty() || layersOption->count() > 0 ? fractal.layers : int(recipe.size());
+  return recipe.empty() || layersOption->count() > 0 ? layers : int(recipe.size());
+}
+
+FieldValue CloudArguments::variedAmplitude() const {
+  if (!amplitude.constant || amplitudeVariation == 0) return amplitude;
+  // Calm parts are calmer than clumps are rough: bumps that are higher cost more.
+  const std::string factors =
+      fmt::format("*noise:2x,2:{},{}", 1 - amplitudeVariation, 1 + amplitudeVariation / 2);
+  return parseFieldValue("--amplitude", amplitude.text + factors, kAmplitude);
+}
+
+FieldValue CloudArguments::variedEdge() const {
+  if (!edgeThickness.constant || edgeVariation == 1) return edgeThickness;
+  const std::string factors = fmt::format("*noise:3x:{},{}", 1 / edgeVariation, edgeVariation);
+  return parseFieldValue("--edge-thickness", edgeThickness.text + factors, kEdgeThickness);
 }
 
 FieldSources CloudArguments::sources(const Mesh& mesh, const Run& run) const {
   // Few bumps rise above twice their rms; farther out look-ups are slower, not wrong.
   constexpr double kHighest = 2;
   const double longestSide = run.longestSide(boundingBox(mesh));
+  const int count = layerCount() > 0 ? layerCount() : kMaxCumuloLayers;
   double rms = 0;
-  for (int i = 0; i < layerCount(); ++i) {
+  for (int i = 0; i < count; ++i) {
     const bool hasOwn = std::size_t(i) < recipe.size() && recipe[std::size_t(i)].amplitude;
-    const FieldValue& given = hasOwn ? *recipe[std::size_t(i)].amplitude : amplitude;
+    const FieldValue given = hasOwn ? *recipe[std::size_t(i)].amplitude : variedAmplitude();
     rms += FieldSources::bound(given, mesh, seed, run) *
            (hasOwn ? 1 : std::pow(FieldSources::bound(roughness, mesh, seed, run), i));
   }
   return {mesh,
           {.voxelSize = voxel(longestSide),
            .reach = std::min(kHighest * rms, longestSide) +
-                    2 * double(cloudEdgeReach(float(FieldSources::bound(edgeThickness, mesh, seed, run)),
+                    2 * double(cloudEdgeReach(float(FieldSources::bound(variedEdge(), mesh, seed, run)),
                                               float(voxel(longestSide)))),
            .seed = seed},
           run};
@@ -40,11 +55,11 @@ CloudOptions CloudArguments::resolved(FieldSources& sources, const Run& run) con
   CloudOptions result = cloud;
   result.voxelSize = float(sources.voxelSize());
   CumuloFractal form = fractal;
-  form.layers = layerCount();
+  form.layers = layerCount() > 0 ? layerCount() : kMaxCumuloLayers;
   const double passed = noiseSpeed * (run.part ? run.part->framesSinceFirst : 0);
   if (noiseTime) form.noise.time = float(*noiseTime + passed);
   if (noisePeriod) form.noise.period = float(*noisePeriod);
-  form.amplitude = sources.field(amplitude);
+  form.amplitude = sources.field(variedAmplitude());
   form.frequency = sources.field(frequency);
   form.lacunarity = sources.field(lacunarity);
   form.roughness = sources.field(roughness);
@@ -55,7 +70,8 @@ CloudOptions CloudArguments::resolved(FieldSources& sources, const Run& run) con
   for (LayerRecipe& layer : now)
     if (layer.time) *layer.time += float(passed);
   result.layers = recipeLayers(now, form, sources);
-  result.edgeThickness = sources.field(edgeThickness);
+  if (layerCount() == 0) result.layers.resize(layersThatShow(result.layers, result.voxelSize));
+  result.edgeThickness = sources.field(variedEdge());
   result.edgeExponent = density.edgeExponent;
   result.densityFactor = density.factor(sources, shape.isGenerated(), form.seed);
   result.withSurface = !surface.empty();
@@ -90,9 +106,12 @@ std::string CloudArguments::noiseOf(std::size_t index) const {
 namespace {
 
 void addLayerOptions(CLI::App& app, CloudArguments& a) {
-  a.layersOption =
-      addCount(app, "--layers", a.fractal.layers, 1, kMaxCumuloLayers, "Layers of displacement.");
+  a.layersOption = addCount(app, "--layers", a.layers, 0, kMaxCumuloLayers,
+                            "Layers of displacement; 0: as many as the voxels can show.");
   addFieldValue(app, "--amplitude", a.amplitude, "Rms height of the first layer's bumps.");
+  addNumber(app, "--amplitude-variation", a.amplitudeVariation, 0, 1,
+            "Share by which an --amplitude of one value goes down where the cloud is calm, and half of that "
+            "up in its clumps.");
   addFieldValue(app, "--frequency", a.frequency, "Frequency of the first layer's bumps.");
   addFieldValue(app, "--lacunarity", a.lacunarity, "Frequency of a layer, in that of the one before.");
   addFieldValue(app, "--roughness", a.roughness, "Height of a layer, in that of the one before.");
@@ -138,6 +157,9 @@ void addCloudOptions(CLI::App& app, CloudArguments& a) {
   addCount(app, "--medial-smoothing", a.cloud.medialSmoothing, 0, kMaxMedialSmoothing,
            "Voxels by which jumps between facing parts are smoothed.");
   addFieldValue(app, "--edge-thickness", a.edgeThickness, "Width over which density rises to 1.");
+  addNumber(app, "--edge-variation", a.edgeVariation, 1, 10,
+            "Factor by which an --edge-thickness of one value goes up where veils are, and down elsewhere; "
+            "1: the same everywhere.");
   addDensityOptions(app, a.density);
   addCloudAdvectionOptions(app, a.advection);
   addCloudCacheOptions(app, a.cache);

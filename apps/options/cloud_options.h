@@ -21,15 +21,19 @@ struct CloudArguments {
   CloudCacheArguments cache;
   std::string output, surface;
   Length voxelSize;
-  int resolution = 256, seed = 0;
+  int resolution = 512, seed = 0;
   FieldValue amplitude = parseFieldValue("--amplitude", "2.5%", kAmplitude);
   FieldValue frequency = parseFieldValue("--frequency", "4.4x", kFrequency);
   FieldValue lacunarity = parseFieldValue("--lacunarity", "2.1", kLacunarity);
-  FieldValue roughness = parseFieldValue("--roughness", "0.6", kRoughness);
+  FieldValue roughness = parseFieldValue("--roughness", "0.65", kRoughness);
   FieldValue billow = parseFieldValue("--billow", "0.5", kBillow);
   FieldValue billowScale = parseFieldValue("--billow-scale", "1", kBillowScale);
   FieldValue edgeThickness = parseFieldValue("--edge-thickness", "0.35%", kEdgeThickness);
-  /// What needs no conversion: count and noise of the layers; the rest is filled in by `resolved`.
+  /// How far an amplitude and an edge that are given as one value go up and down from place to place.
+  double amplitudeVariation = 0.6, edgeVariation = 2.5;
+  /// 0: as many as the voxels can show.
+  int layers = 0;
+  /// What needs no conversion, the noise of the layers; the rest is filled in by `resolved`.
   CumuloFractal fractal;
   const CLI::Option* layersOption = nullptr;
   std::optional<double> noiseTime, noisePeriod;
@@ -45,8 +49,6 @@ struct CloudArguments {
   }
   /// World units, for a shape with this longest side.
   double voxel(double longestSide) const;
-  /// As typed, else those of the recipe, else the default.
-  int layerCount() const;
   /// What the parameters of a cloud on `mesh` are made from.
   FieldSources sources(const Mesh& mesh, const Run& run) const;
   /// The library's options. @throws Error naming an option whose field cannot be made.
@@ -57,6 +59,12 @@ struct CloudArguments {
   std::vector<std::string> maskFiles() const;
   /// What noise layer `index` has: "worley, 3 octaves".
   std::string noiseOf(std::size_t index) const;
+
+ private:
+  /// As typed, or those of the recipe; 0: as many as the voxels can show.
+  int layerCount() const;
+  FieldValue variedAmplitude() const;
+  FieldValue variedEdge() const;
 };
 
 /// Declares the options on `app`.

@@ -20,6 +20,8 @@ namespace nephele {
 namespace {
 
 constexpr float kFarthestVoxels = 1e5f;
+/// Of the noise; its absolute value has twice the frequency.
+constexpr float kVoxelsPerWave = 4;
 
 Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
   const VdbGrid grid = readScalarGrid(path);
@@ -139,6 +141,15 @@ float cloudEdgeReach(float edgeThickness, float voxelSize) {
   float reach = kLeastVoxels * voxelSize;
   while (reach < edgeThickness / 2) reach *= 2;
   return reach;
+}
+
+std::size_t layersThatShow(const std::vector<CumuloLayer>& layers, float voxelSize) {
+  const auto isTooFine = [&](const CumuloLayer& layer) {
+    return layer.frequency * layer.detail * kVoxelsPerWave * voxelSize > 1;
+  };
+  std::size_t count = layers.size();
+  while (count > 1 && isTooFine(layers[count - 1])) --count;
+  return count;
 }
 
 Cloud makeCloud(const Mesh& mesh, const CloudOptions& options, const Progress& progress) {

@@ -53,6 +53,10 @@ Cloud makeCloud(const CloudLevels& levels, const CloudOptions& options, const Pr
 /// twice that as often as it takes. @throws Error unless voxelSize > 0 and edgeThickness is finite.
 float cloudEdgeReach(float edgeThickness, float voxelSize);
 
+/// How many of the layers, from the first, voxels of this size show: bumps of the last have four voxels to a
+/// wave, of which the absolute value makes two. At least 1, if there is one.
+std::size_t layersThatShow(const std::vector<CumuloLayer>& layers, float voxelSize);
+
 /// Memory that a program needs for `makeCloud`, bytes, from the area of the mesh: -10 to +50 % of what was
 /// measured. @throws Error if there is no layer.
 double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options);

@@ -52,7 +52,7 @@ using detail::Packing;
 /// Samples per wave of the finest noise: of layers that others build on, of the last one, and the least.
 constexpr float kSamplesPerWave = 16;
 constexpr float kSamplesPerLastWave = 12;
-constexpr float kFewestSamplesPerWave = 8;
+constexpr float kFewestSamplesPerWave = 6;
 /// Jumps are smoothed over at least this many voxels of a layer's grid to either side: fewer leave edges too
 /// steep.
 constexpr int kLeastDilation = 2;

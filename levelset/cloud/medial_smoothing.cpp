@@ -3,12 +3,13 @@
 // fixed number of times, with the unmarked samples held: heat that flows inside the mark only.
 //
 // Marks are bits, one byte per row of a brick. Bricks that hold marked samples get a second set of samples,
-// and a diffusion step goes from one set to the other, row by row; a bit for every neighbour of a row's
-// samples says what it conducts, so that a row is a few vectors.
+// and a diffusion step goes from one set to the other, row by row.
 //
 // Limits: a jump that is smaller than what noise of the layer's frequency can do over one voxel is not seen,
 // and stays.
 #include "nephele/levelset/cloud/medial_smoothing.h"
+
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <array>
@@ -25,6 +26,8 @@ namespace nephele {
 namespace {
 
 using detail::BrickSamples;
+
+namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kRows = kBrick * kBrick;
@@ -247,39 +250,78 @@ class Heat {
   }
 
  private:
-  /// One step of one brick, by absolute values; signs stay.
+  /// The absolute values of a brick and of the layer of samples around it, without edges and corners.
+  class Around {
+   public:
+    Around(const std::vector<float*>& samples, const Neighbours& neighbours, std::size_t brick) {
+      const auto rowsOf = [&](std::size_t direction) { return samples[neighbours(brick, direction)]; };
+      for (int z = 0; z < kBrick; ++z)
+        for (int y = 0; y < kBrick; ++y) {
+          const int row = z * kBrick + y;
+          put(y, z, samples[brick] + row * kBrick);
+          at(y, z)[-1] = std::abs(rowsOf(0)[row * kBrick + kBrick - 1]);
+          at(y, z)[kBrick] = std::abs(rowsOf(1)[row * kBrick]);
+        }
+      constexpr int kLast = kBrick - 1;
+      for (int i = 0; i < kBrick; ++i) {
+        put(-1, i, rowsOf(2) + (i * kBrick + kLast) * kBrick);
+        put(kBrick, i, rowsOf(3) + i * kBrick * kBrick);
+        put(i, -1, rowsOf(4) + (kLast * kBrick + i) * kBrick);
+        put(i, kBrick, rowsOf(5) + i * kBrick);
+      }
+    }
+    /// The first sample of a row.
+    const float* row(int y, int z) const { return values_.data() + offset(y, z); }
+
+   private:
+    // Room on both sides, and rows that begin where vectors do.
+    static constexpr int kStride = 2 * kBrick, kWidth = kBrick + 2;
+
+    static std::size_t offset(int y, int z) {
+      return std::size_t(((z + 1) * kWidth + y + 1) * kStride + kStride / 2);
+    }
+    float* at(int y, int z) { return values_.data() + offset(y, z); }
+    void put(int y, int z, const float* from) {
+      float* row = at(y, z);
+      for (int x = 0; x < kBrick; ++x) row[x] = std::abs(from[x]);
+    }
+
+    alignas(64) std::array<float, std::size_t(kWidth* kWidth* kStride + kStride)> values_;
+  };
+
+  /// One step of one brick, by absolute values; signs stay. What is 0 is outside of the band.
   void diffuse(std::size_t brick, float* next) const {
-    const auto rowAt = [&](const RowPlace& place) { return current_[place.brick] + place.row * kBrick; };
+    const Around around(current_, neighbours_, brick);
     for (int r = 0; r < kRows; ++r) {
-      const float* own = rowAt({brick, r});
+      const float* own = current_[brick] + r * kBrick;
       const std::uint8_t bits = mask_.row(brick, r);
       float* result = next + r * kBrick;
       if (bits == 0) {
         std::copy_n(own, kBrick, result);
         continue;
       }
-      const std::array<RowValues, 6> beside = valuesBeside(neighbours_, brick, r, rowAt);
-      const std::array<std::uint8_t, 6> marks = mask_.beside(brick, r);
-      // Held neighbours first: their sum is the same in every step.
-      RowValues held{}, sum, count;
-      for (std::size_t n = 0; n < 6; ++n) {
-        const RowValues& marked = kBitsAsFloats.of[marks[n]];
-        for (std::size_t x = 0; x < kBrick; ++x) held[x] += std::abs(beside[n][x]) * (1 - marked[x]);
-      }
-      for (std::size_t x = 0; x < kBrick; ++x) {
-        sum[x] = std::abs(own[x]) + held[x];
-        count[x] = 1;
-      }
-      for (std::size_t n = 0; n < 6; ++n) {
-        const RowValues& marked = kBitsAsFloats.of[marks[n]];
-        for (std::size_t x = 0; x < kBrick; ++x) {
-          sum[x] += std::abs(beside[n][x]) * marked[x];
-          count[x] += beside[n][x] != 0 ? 1.0f : marked[x];
+      const int y = r % kBrick, z = r / kBrick;
+      const float* row = around.row(y, z);
+      const std::array<const float*, 6> beside{row - 1,
+                                               row + 1,
+                                               around.row(y - 1, z),
+                                               around.row(y + 1, z),
+                                               around.row(y, z - 1),
+                                               around.row(y, z + 1)};
+      const float* marked = kBitsAsFloats.of[bits].data();
+      const hn::CappedTag<float, kBrick> d;
+      const auto one = hn::Set(d, 1.0f);
+      for (std::size_t x = 0; x < kBrick; x += hn::Lanes(d)) {
+        auto sum = hn::LoadU(d, row + x), count = one;
+        for (const float* values : beside) {
+          const auto value = hn::LoadU(d, values + x);
+          sum = hn::Add(sum, value);
+          count = hn::Add(count, hn::IfThenElseZero(hn::Ne(value, hn::Zero(d)), one));
         }
+        const auto old = hn::LoadU(d, own + x);
+        const auto isMarked = hn::Ne(hn::LoadU(d, marked + x), hn::Zero(d));
+        hn::StoreU(hn::IfThenElse(isMarked, hn::CopySign(hn::Div(sum, count), old), old), d, result + x);
       }
-      const RowValues& marked = kBitsAsFloats.of[bits];
-      for (std::size_t x = 0; x < kBrick; ++x)
-        result[x] = marked[x] != 0 ? std::copysign(sum[x] / count[x], own[x]) : own[x];
     }
   }
 

@@ -52,7 +52,8 @@ class CloudRecipe : public testing::Test {
 };
 
 TEST_F(CloudRecipe, OfLayersWithoutKeysIsTheFractalForm) {
-  const std::string common = "--resolution 40 --amplitude 3% --noise value --seed 5 ";
+  const std::string common =
+      "--resolution 40 --amplitude 3% --amplitude-variation 0 --roughness 0.6 --noise value --seed 5 ";
   const auto fractal = grown("", common + "--layers 2"), recipe = grown("[[layer]]\n[[layer]]\n", common);
   EXPECT_EQ(fractal->values(), recipe->values());
   // What the fractal form gives a layer, said again by the recipe.
@@ -149,7 +150,9 @@ TEST_F(CloudRecipe, LayersAsTypedCutTheRecipeShortOrGoOnFromIt) {
   grown(recipe, "--resolution 32 --layers 1");
   ASSERT_EQ(layers.size(), 1u);
   EXPECT_NEAR(double(layers[0]["amplitude"]), 0.06, 1e-6);
-  grown(recipe, "--resolution 32 --layers 3 --amplitude 0.04 --roughness 0.5 --frequency 1 --lacunarity 2");
+  grown(recipe,
+        "--resolution 32 --layers 3 --amplitude 0.04 --amplitude-variation 0 --roughness 0.5 --frequency 1 "
+        "--lacunarity 2");
   ASSERT_EQ(layers.size(), 3u);
   EXPECT_NEAR(double(layers[1]["amplitude"]), 0.05, 1e-6);
   // The third layer of the fractal form: 0.04 / 2 / 2, 1 x 2 x 2.

@@ -36,8 +36,8 @@ TEST(CloudVerb, WritesFogAndSurfaceWithStatistics) {
   for (const char* key : {"amplitude", "frequency", "voxel_size", "active_voxels", "unconverged_fraction",
                           "mean_displacement", "seconds"})
     EXPECT_TRUE(stats["layers"][1].contains(key)) << key;
-  // Fractal form: amplitude falls by --roughness 0.6, frequency rises by --lacunarity 2.1.
-  EXPECT_NEAR(double(stats["layers"][1]["amplitude"]) / double(stats["layers"][0]["amplitude"]), 0.6, 1e-4);
+  // Fractal form: amplitude falls by --roughness 0.65, frequency rises by --lacunarity 2.1.
+  EXPECT_NEAR(double(stats["layers"][1]["amplitude"]) / double(stats["layers"][0]["amplitude"]), 0.65, 1e-4);
   EXPECT_NEAR(double(stats["layers"][1]["frequency"]) / double(stats["layers"][0]["frequency"]), 2.1, 1e-4);
   EXPECT_LE(double(stats["layers"][1]["unconverged_fraction"]), 0.01);
 }
@@ -78,6 +78,68 @@ TEST(CloudVerb, GrowsOnALevelSetAsOnItsMesh) {
   const double mesh = volumeOf(kSphere), levelSet = volumeOf(folder.file("in.vdb"));
   EXPECT_GT(mesh, 0);
   EXPECT_NEAR(levelSet / mesh, 1.0, 0.01);
+}
+
+/// The layers of a cloud on the sphere, as the statistics tell them.
+nlohmann::json layersOf(const std::string& options) {
+  const TemporaryFolder folder;
+  const ProgramResult result = runProgram("cloud " + kSphere + " -o " + folder.file("cloud.vdb") +
+                                          " --stats " + folder.file("stats.json") + " " + options);
+  EXPECT_EQ(result.exitCode, 0) << options << ": " << result.errors;
+  EXPECT_EQ(result.errors.find("warning"), std::string::npos) << result.errors;
+  return nlohmann::json::parse(textOf(folder.file("stats.json")))["layers"];
+}
+
+TEST(CloudVerb, HasAsManyLayersAsItsVoxelsShow) {
+  // Four voxels to a wave: frequencies up to a quarter of the resolution, 4.4, 9.24, 19.4 waves along the
+  // longest side.
+  EXPECT_EQ(layersOf("--resolution 36").size(), 1u);
+  EXPECT_EQ(layersOf("--resolution 38").size(), 2u);
+  EXPECT_EQ(layersOf("--resolution 76").size(), 2u);
+  EXPECT_EQ(layersOf("--resolution 79").size(), 3u);
+  // At least one, of however few voxels.
+  EXPECT_EQ(layersOf("--resolution 38 --frequency 9x").size(), 1u);
+  EXPECT_EQ(layersOf("--resolution 79 --layers 2").size(), 2u);
+  // The coarse cloud has the first layers of the fine one.
+  const auto coarse = layersOf("--resolution 38"), fine = layersOf("--resolution 79");
+  for (std::size_t i = 0; i < coarse.size(); ++i)
+    for (const char* key : {"amplitude_range", "frequency"}) EXPECT_EQ(coarse[i][key], fine[i][key]) << i;
+}
+
+TEST(CloudVerb, IsCalmInSomePartsAndRoughInOthers) {
+  const auto rangeOf = [](const std::string& options) {
+    return layersOf("--resolution 38 " + options)[0]["amplitude_range"].get<std::array<double, 2>>();
+  };
+  const auto [calm, rough] = rangeOf("--amplitude 0.05 --amplitude-variation 0.8");
+  EXPECT_NEAR(calm, 0.05 * (1 - 0.8), 0.05 * 0.3);
+  EXPECT_NEAR(rough, 0.05 * (1 + 0.8 / 2), 0.05 * 0.3);
+  EXPECT_GE(calm, 0.05 * (1 - 0.8) - 1e-6);
+  EXPECT_LE(rough, 0.05 * (1 + 0.8 / 2) + 1e-6);
+  const auto [low, high] = rangeOf("--amplitude 0.05 --amplitude-variation 0");
+  EXPECT_FLOAT_EQ(float(low), 0.05f);
+  EXPECT_FLOAT_EQ(float(high), 0.05f);
+  // What varies by itself is taken as it is.
+  const auto [least, most] = rangeOf("--amplitude height:0=0.04,1=0.06 --amplitude-variation 1");
+  EXPECT_FLOAT_EQ(float(least), 0.04f);
+  EXPECT_FLOAT_EQ(float(most), 0.06f);
+}
+
+TEST(CloudVerb, HasThinVeilsBesideSharpEdges) {
+  const TemporaryFolder folder;
+  // Without bumps the density across the edge of a sphere of radius 1 tells how wide the edge is.
+  const auto grown = [&](const std::string& options) {
+    const ProgramResult result =
+        runProgram("cloud " + kSphere + " -o " + folder.file("cloud.vdb") +
+                   " --resolution 64 --layers 1 --amplitude 0 --edge-thickness 0.1 " + options);
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return describe(readScalarGrid(folder.file("cloud.vdb"), "density"));
+  };
+  const auto radiusOf = [](const VdbGridInfo& info) { return info.indexMax.y / 32.0; };
+  // Half of the edge is outside: 0.05, or at most 2.5 times that; to a voxel, of 1/32.
+  EXPECT_NEAR(radiusOf(grown("--edge-variation 1")), 1.05, 1.0 / 32);
+  const double veil = radiusOf(grown("--edge-variation 2.5"));
+  EXPECT_GT(veil, 1.05 + 1.0 / 64);
+  EXPECT_LE(veil, 1.125 + 1.0 / 32);
 }
 
 /// The density of a cloud without an input, 1 world unit large, in voxels of 1/24.
@@ -248,7 +310,7 @@ TEST(CloudVerb, WorksAtResolutionOne) {
 }
 
 TEST(CloudVerb, BadOptionsAreUsageErrorsThatNameThem) {
-  for (const std::string bad : {"--layers 0",
+  for (const std::string bad : {"--layers -1",
                                 "--layers 99",
                                 "--amplitude -1%",
                                 "--frequency 0x",

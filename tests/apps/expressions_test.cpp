@@ -46,7 +46,7 @@ double sumOf(const Image& image, const std::string& channel) {
 TEST(Expressions, AreWhatShortFormsAreShortFor) {
   const TemporaryFolder folder;
   const std::pair<const char*, const char*> pairs[] = {
-      {"--amplitude 2%", "--amplitude '=2%'"},
+      {"--amplitude 2% --amplitude-variation 0", "--amplitude '=2%'"},
       {"--amplitude height:0=1%,0.6=3%", "--amplitude '=ramp(height, [0, 0.6], [1%, 3%])'"},
       {"--amplitude facing:0,2,0:-1=1%,1=3%", "--amplitude '=ramp(facing((0,2,0)), [-1, 1], [1%, 3%])'"},
       {"--billow noise:3x,2:0.2,1",

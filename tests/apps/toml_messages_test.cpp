@@ -211,7 +211,7 @@ TEST(TomlMessages, AllFaultsOfAFileAreToldAtOnce) {
             "  seed = 'x'\n"
             "         ^~~\n");
   EXPECT_EQ(messageOf("--config", "layers = 99\nnoise = [\"perlin\", \"perln\"]\n[cloud]\nbillow = -1\n"),
-            "a.toml:1:10: error: layers: got '99', allowed: a whole number from 1 to 16\n"
+            "a.toml:1:10: error: layers: got '99', allowed: a whole number from 0 to 16\n"
             "  layers = 99\n"
             "           ^~\n"
             "a.toml:2:20: error: noise: got 'perln', allowed: one of "

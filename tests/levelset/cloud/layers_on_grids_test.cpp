@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/cloud/cloud_density.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/grid/bake.h"
@@ -93,7 +94,16 @@ TEST(CumuloGrids, VoxelSizeFollowsTheFrequency) {
   EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 0, 0.001f), 1 / 32.0f);  // 16 samples per wave
   EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 1, 0.001f), 1 / 24.0f);  // 12 for the last
   EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 0, 0.05f), 0.05f);       // not finer than the result needs
-  EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 0, 0.5f), 1 / 16.0f);    // never fewer than 8 samples per wave
+  EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 0, 0.5f), 1 / 12.0f);    // never fewer than 6 samples per wave
+}
+
+TEST(CumuloGrids, VoxelsShowLayersWithFourOfThemToAWave) {
+  const std::vector<CumuloLayer> layers{{.frequency = 2}, {.frequency = 4}, {.frequency = 4, .detail = 2}};
+  EXPECT_EQ(layersThatShow(layers, 0.001f), 3u);
+  EXPECT_EQ(layersThatShow(layers, 1 / 31.0f), 2u);  // 1 / (4 x 4 x 2) is the largest for the third
+  EXPECT_EQ(layersThatShow(layers, 1 / 15.0f), 1u);
+  EXPECT_EQ(layersThatShow(layers, 100.0f), 1u);
+  EXPECT_EQ(layersThatShow({}, 1.0f), 0u);
 }
 
 TEST(CumuloGrids, OneLayerOnASphereHasTheClosedForm) {
