@@ -231,11 +231,10 @@ if picture mesh_decimated; then
 fi
 
 if [ -n "${DISNEY:-}" ] && picture detail_4k; then
-  grow coarse.vdb cloud $base
-  grow detail.vdb cloud $base --resolution 512 --layers 5 --roughness 0.65 --billow 0.4 --amplitude "2.5%*noise:2x,2:0.6,1.5" --flat-base 3%,6% \
-    --edge-thickness "0.4%*noise:3x:0.6,4" --advect "1%*noise:2x:0,1*height:0=1.4,0.6=0.6,1=0.1" --advect-frequency 18x
+  grow default.vdb cloud $base
+  grow fine.vdb cloud $base --resolution 1024
   files= crops=
-  for volume in coarse.vdb detail.vdb felt/cumulus_detail.felt "$DISNEY"; do
+  for volume in default.vdb fine.vdb felt/cumulus_detail.felt "$DISNEY"; do
     name=$(basename "$volume" .vdb)
     view="--view 25,0 --sun 100,35"
     [ "$name" != cumulus_detail.felt ] || view="$view --set mesh=\"$base\""
