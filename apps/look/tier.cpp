@@ -209,8 +209,8 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
   picture.frame.width = frame.width;
   picture.frame.height = frame.height;
   if (plan.subject.kind == LookSubject::Kind::script) {
-    chooseVoxels(plan, picture, frame.samples == 0, finer, run);
     (finer ? finer : this)->script(plan, run).suggestTo(picture);
+    chooseVoxels(plan, picture, frame.samples == 0, finer, run);
   }
   picture.render.aovs = frame.show.layers();
   // The surface of a cloud is that of its levels.

@@ -81,6 +81,7 @@ void FieldMarcher::march(const MarchScene& scene, std::span<const MarchRay> rays
     });
   }
   if (colour_ && scene.hasStepColours) askColours(rays);
+  if (glow_ && scene.hasStepGlow) addGlow(rays);
   spans_.assign(steps_.begin(), steps_.begin() + std::ptrdiff_t(rays.size()));
   marchSteps(scene, rays, spans_, results, records);
   for (std::size_t i = 0; i != rays.size(); ++i) results[i].samples = states_[i].samples;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nephele/render/march/march_kernels.h"
-#include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/field_glow.h"
 #include "nephele/render/volume/march_scene.h"
 
 namespace nephele {
@@ -37,14 +37,15 @@ struct FieldSteps {
 /// contribution.
 class FieldMarcher {
  public:
-  /// Keeps references to `density` and to its `colour`, which may be null.
-  FieldMarcher(const FieldDensity& density, const FieldSteps& steps, const VectorField* colour = nullptr)
-      : density_(density), colour_(colour), how_(steps) {}
+  /// Keeps references to `density` and to its `colour` and `glow`, which may be null.
+  FieldMarcher(const FieldDensity& density, const FieldSteps& steps, const VectorField* colour = nullptr,
+               const FieldGlow* glow = nullptr)
+      : density_(density), colour_(colour), glow_(glow), how_(steps) {}
 
   /// As marchRays, with the density of the field along MarchRay::world; those of `scene` are not read. Where
   /// MarchScene::hasStepColours, the colour is asked for once for every step that the light is read for.
-  /// `samples` of the results are evaluations of the field. What becomes of a ray does not depend on the
-  /// others.
+  /// Where it has a glow of steps, so is the glow, and there are steps where there is nothing else. `samples`
+  /// of the results are evaluations of the field. What becomes of a ray does not depend on the others.
   void march(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,
              std::span<MarchRecord> records = {});
 
@@ -94,10 +95,13 @@ class FieldMarcher {
   void addLight(State& state, MarchStep step, std::vector<MarchStep>& steps) const;
   void growLight(State& state) const;
   void askColours(std::span<const MarchRay> rays);
+  void addGlow(std::span<const MarchRay> rays);
+  void fillGlowing(std::uint32_t ray);
   float depthOf(const Piece& piece) const;
 
   const FieldDensity& density_;
   const VectorField* colour_;
+  const FieldGlow* glow_;
   FieldSteps how_;
   float extinction_ = 1.0f, cutoff_ = 0.0f, leastStep_ = 0.0f, leastLight_ = 0.0f, leastColour_ = 1.0f,
         growth_ = 1.0f, hidden_ = 0.0f;
@@ -108,6 +112,12 @@ class FieldMarcher {
   std::size_t firstCount_ = 0;
   FieldDensity::Batch batch_;
   std::vector<std::vector<MarchStep>> steps_;
+  // With those that only glow; and which steps may glow at all.
+  std::vector<MarchStep> filled_;
+  struct Glowing {
+    std::uint32_t ray, step;
+  };
+  std::vector<Glowing> glowing_;
   std::vector<std::span<const MarchStep>> spans_;
   // Places and colours of steps.
   std::array<std::vector<float>, 6> lanes_;

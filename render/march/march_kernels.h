@@ -92,6 +92,8 @@ struct MarchStep {
   float begin = 0.0f, length = 0.0f, opticalDepth = 0.0f, place = 0.0f;
   /// Multiplies the albedo where MarchScene::hasStepColours.
   Vec3f colour{1, 1, 1};
+  /// In the units of MarchScene::emission, where MarchScene::hasStepGlow. Such steps need no optical depth.
+  Vec3f glow{};
 };
 
 /// As marchRays where the steps are known, near to far: the densities of `scene` are not read.

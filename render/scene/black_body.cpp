@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 namespace nephele {
 
@@ -75,6 +77,46 @@ BlackBodyColours::BlackBodyColours(float hottest) : perKelvin_(float(kSteps) / s
     return;
   }
   for (int i = 0; i <= kSteps + 1; ++i) table_.push_back(blackBody(double(i) / double(perKelvin_)));
+}
+
+namespace {
+
+class BlackBodyNode final : public FieldNode<Vec3f> {
+ public:
+  BlackBodyNode(NodePtr<float> kelvin, std::shared_ptr<const BlackBodyColours> colours)
+      : kelvin_(std::move(kelvin)), colours_(std::move(colours)) {}
+
+  void eval(const PointBlock& points, const BlockLanes<3>& values, Scratch& scratch) const override {
+    Scratch::Frame frame(scratch);
+    float* const kelvin = frame.lane();
+    kelvin_->eval(points, {kelvin}, scratch);
+    for (int i = 0; i != points.count; ++i) {
+      const Vec3f colour = (*colours_)(kelvin[i] > 0 ? kelvin[i] : 0.0f);
+      for (int c = 0; c != 3; ++c) values[std::size_t(c)][i] = colour[c];
+    }
+  }
+  // From 500 K on every colour grows with the heat; below there is next to none of it.
+  RangeOf<Vec3f> range(const Box& box, RangeMemo& memo) const override {
+    const float hottest = memo.of(kelvin_, box).max;
+    const Vec3f most = hottest > 0 ? (*colours_)(std::max(hottest, 500.0f)) : Vec3f{};
+    return {Interval{0.0f, most.x}, Interval{0.0f, most.y}, Interval{0.0f, most.z}};
+  }
+  NodePtr<Vec3f> restricted(Restriction& restriction) const override {
+    const NodePtr<float> kelvin = restrictNode(kelvin_, restriction);
+    return kelvin == kelvin_ ? nullptr : std::make_shared<BlackBodyNode>(kelvin, colours_);
+  }
+  float differenceStep() const override { return kelvin_->differenceStep(); }
+
+ private:
+  NodePtr<float> kelvin_;
+  std::shared_ptr<const BlackBodyColours> colours_;
+};
+
+}  // namespace
+
+VectorField blackBody(const ScalarField& kelvin, float hottest) {
+  return VectorField(
+      std::make_shared<BlackBodyNode>(kelvin.node(), std::make_shared<const BlackBodyColours>(hottest)));
 }
 
 }  // namespace nephele

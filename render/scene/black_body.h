@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/math.h"
+#include "nephele/modeling/field/field.h"
 
 namespace nephele {
 
@@ -31,5 +32,9 @@ class BlackBodyColours {
   float perKelvin_;
   std::vector<Vec3f> table_;
 };
+
+/// Colours of what is as hot as `kelvin` says, from the same table: what is hotter than `hottest` counts as
+/// that, and NaN as 0 K.
+VectorField blackBody(const ScalarField& kelvin, float hottest);
 
 }  // namespace nephele

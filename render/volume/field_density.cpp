@@ -117,7 +117,7 @@ struct FieldDensity::Build {
       found.restricted.push_back(task.field);
     found.fields.push_back(int(found.restricted.size()) - 1);
     addCells(task.field, density.ranges_[entry], task.brick * kBrick, {}, kBrick, found.cells.emplace_back());
-    findFlat(task.field, task.brick * kBrick, found);
+    if (density.looksForFlat_) findFlat(task.field, task.brick * kBrick, found);
   }
 
   // Finds the cells in and around which the density is the same at every half of a cell.
@@ -181,8 +181,9 @@ struct FieldDensity::Build {
   }
 };
 
-FieldDensity::FieldDensity(const ScalarField& density, const Box& box, float cell, const Progress& progress)
-    : box_(box), cell_(cell), perBrick_(1 / (cell * kBrick)), fields_{density} {
+FieldDensity::FieldDensity(const ScalarField& density, const Box& box, float cell, const Progress& progress,
+                           bool looksForFlat)
+    : box_(box), cell_(cell), perBrick_(1 / (cell * kBrick)), looksForFlat_(looksForFlat), fields_{density} {
   require(!box.isEmpty() && isFinite(box.min) && isFinite(box.max) && box.longestSide() > 0,
           "field density: expected a box that is bounded and not empty");
   require(std::isfinite(cell) && cell > 0,

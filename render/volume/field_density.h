@@ -27,9 +27,11 @@ class FieldDensity {
 
   /// Cost: ranges of the field over all cells that are neither empty nor constant, some microseconds each on
   /// all cores, and 1 kB per brick of 8^3 of them. The result does not depend on the number of threads.
+  /// Where it `looksForFlat` parts, see Span, some 18 evaluations per cell besides.
   /// @throws Error if the box is empty or unbounded, `cell` (the edge of a cell, world units) is not above 0,
   /// or more than 2^24 bricks were needed; Cancelled.
-  FieldDensity(const ScalarField& density, const Box& box, float cell, const Progress& progress = silent());
+  FieldDensity(const ScalarField& density, const Box& box, float cell, const Progress& progress = silent(),
+               bool looksForFlat = true);
 
   const Box& box() const { return box_; }
   float cell() const { return cell_; }
@@ -121,6 +123,7 @@ class FieldDensity {
 
   Box box_;
   float cell_, perBrick_;
+  bool looksForFlat_;
   Vec3i bricks_{};
   bool isEmpty_ = true;
   // By brick: bounds, which cells it has (none: -1), which part of space it belongs to, and how many bricks

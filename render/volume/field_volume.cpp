@@ -21,7 +21,10 @@
 #include "nephele/modeling/base/octant.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
+#include "nephele/render/scene/black_body.h"
 #include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/field_glow.h"
+#include "nephele/render/volume/moved_field.h"
 #include "nephele/render/volume/volume_parts.h"
 
 namespace nephele {
@@ -32,6 +35,8 @@ constexpr int kLevels = 6;
 constexpr float kFinest = 1e-5f;
 // Along the box at most, of what changes slowly.
 constexpr float kVelocityVoxels = 128;
+// Along the box, where it is only looked whether a velocity is known.
+constexpr float kVelocityChecks = 32;
 
 // The smallest width that a pixel has in the part of `box` that the picture may show; infinite where it shows
 // none of it.
@@ -102,6 +107,62 @@ VolumePart::Grids threeGrids(const VectorField& field, const BakeOptions& baking
 VectorField notNegative(const VectorField& field) {
   return vectorField(max(component(field, 0), 0.0f), max(component(field, 1), 0.0f),
                      max(component(field, 2), 0.0f));
+}
+
+// The mean of 8 places in every voxel.
+ScalarField meanOfVoxels(const ScalarField& field, float voxelSize) {
+  ScalarField sum(0.0f);
+  for (int corner = 0; corner != 8; ++corner) {
+    const Vec3f way{corner & 1 ? 0.25f : -0.25f, corner & 2 ? 0.25f : -0.25f, corner & 4 ? 0.25f : -0.25f};
+    sum = sum + translate(field, way * voxelSize);
+  }
+  return sum * 0.125f;
+}
+
+// All light that the parts give off.
+VectorField emissionOf(const FieldParts& parts, float voxelSize, const Progress& progress) {
+  VectorField sum(Vec3f{});
+  if (parts.emission) sum = notNegative(*parts.emission);
+  if (parts.temperature) {
+    const ScalarField kelvin = max(*parts.temperature, 0.0f);
+    VolumePart asked;
+    asked.temperature =
+        bakeGrid(kelvin, {.voxelSize = voxelSize, .box = parts.box, .background = 0.0f}, progress);
+    asked.temperatureScale = 1.0f;
+    check(asked);
+    float hottest = 0;
+    for (const Interval& range : asked.temperature->ranges()) hottest = std::max(hottest, range.max);
+    // Between the voxels it may be hotter.
+    sum = sum + blackBody(kelvin, std::min(kelvin.range(parts.box).max, 2 * hottest));
+  }
+  require(std::isfinite(parts.emissionScale) && parts.emissionScale >= 0,
+          fmt::format("emission scale: expected a finite number >= 0, got {}", parts.emissionScale));
+  return parts.emissionScale == 1.0f ? sum : sum * ScalarField(parts.emissionScale);
+}
+
+// The mean over the shutter of a density, a colour and an emission.
+FieldParts blurred(const FieldParts& parts, const VectorField& velocity, const Shutter& shutter,
+                   float voxelSize, const Progress& progress) {
+  require(std::isfinite(shutter.open) && std::isfinite(shutter.close) && shutter.open <= shutter.close,
+          fmt::format("shutter: expected an opening not after the closing, got {}, {}", shutter.open,
+                      shutter.close));
+  const float coarse = std::max(voxelSize, parts.box.longestSide() / kVelocityChecks);
+  for (const auto& grid : threeGrids(velocity, {.voxelSize = coarse, .box = parts.box}, progress))
+    for (const Interval& range : grid->ranges())
+      require(std::isfinite(range.min) && std::isfinite(range.max),
+              "velocity: contains values that are not finite");
+  constexpr float kLeast = 1e-30f;
+  // Copies that stand a sample apart.
+  const FieldMotion motion{velocity, shutter, parts.box, 0.5f * voxelSize};
+  const ScalarField density = max(parts.density, 0.0f);
+  FieldParts result{.density = blurred(density, motion), .box = motion.reached()};
+  if (parts.colour) {
+    const auto share = [&](int c) { return clamp(component(*parts.colour, c), 0.0f, 1.0f); };
+    result.colour =
+        blurred(vectorField(share(0), share(1), share(2)) * density, motion) / max(result.density, kLeast);
+  }
+  if (parts.emission) result.emission = blurred(*parts.emission, motion);
+  return result;
 }
 
 }  // namespace
@@ -181,25 +242,27 @@ RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progr
 }
 
 RenderVolume gridlessVolume(const FieldParts& parts, float voxelSize, const Progress& progress) {
-  require(!parts.emission && !parts.temperature && !parts.velocity,
-          "gridless volume: an emission, a temperature or a velocity needs a grid");
   require(std::isfinite(parts.share) && parts.share >= 0,
           fmt::format("share: expected a finite number >= 0, got {}", parts.share));
-  const ScalarField density = parts.share == 1.0f ? parts.density : parts.density * parts.share;
-  auto field = std::make_shared<const FieldDensity>(density, parts.box, voxelSize, progress);
-  const ScalarField positive = max(density, 0.0f);
-  ScalarField mean(0.0f);
-  for (int corner = 0; corner != 8; ++corner) {
-    const Vec3f way{corner & 1 ? 0.25f : -0.25f, corner & 2 ? 0.25f : -0.25f, corner & 4 ? 0.25f : -0.25f};
-    mean = mean + translate(positive, way * voxelSize);
-  }
-  mean = mean * 0.125f;
+  FieldParts seen{.density = parts.share == 1.0f ? parts.density : parts.density * parts.share,
+                  .box = parts.box,
+                  .colour = parts.colour};
+  if (parts.emission || parts.temperature) seen.emission = emissionOf(parts, voxelSize, progress);
+  if (parts.velocity) seen = blurred(seen, *parts.velocity, parts.shutter, voxelSize, progress);
+
+  auto field = std::make_shared<const FieldDensity>(seen.density, seen.box, voxelSize, progress);
+  std::shared_ptr<const FieldGlow> glow;
+  if (seen.emission) glow = std::make_shared<const FieldGlow>(*seen.emission, seen.box, voxelSize, progress);
   progress.begin("field");
-  const BakeOptions baking{.voxelSize = voxelSize, .box = parts.box, .background = 0.0f};
+  const BakeOptions baking{.voxelSize = voxelSize, .box = seen.box, .background = 0.0f};
+  const ScalarField mean = meanOfVoxels(max(seen.density, 0.0f), voxelSize);
   VolumePart light;
   light.density = bakeGrid(mean, baking, progress);
-  if (parts.colour) light.colour = threeGrids(*parts.colour * mask(mean), baking, progress);
-  return RenderVolume::ofField(combine({light}, progress), std::move(field), parts.colour);
+  if (seen.colour) light.colour = threeGrids(*seen.colour * mask(mean), baking, progress);
+  for (std::size_t c = 0; c != 3 && seen.emission; ++c)
+    light.emission[c] =
+        bakeGrid(meanOfVoxels(component(*seen.emission, int(c)), voxelSize), baking, progress);
+  return RenderVolume::ofField(combine({light}, progress), std::move(field), seen.colour, std::move(glow));
 }
 
 RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,

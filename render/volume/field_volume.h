@@ -83,19 +83,22 @@ struct FieldParts {
 /// @throws Error as bakeGrid and combine do; Cancelled.
 RenderVolume sampledVolume(const FieldParts& parts, float voxelSize, const Progress& progress = silent());
 
-/// A density that rays ask the field for: no grid is between it and the picture, and detail is as fine as the
+/// What rays ask the fields for: no grid is between them and the picture, and detail is as fine as the
 /// picture asks for, see FieldDensity and Refinement. Values below zero count as zero; outside of the box
-/// there is none.
+/// there is nothing.
 ///
-/// A colour is asked for wherever the light is read, at most a voxel apart along a ray.
+/// A colour is asked for wherever the light is read, at most a voxel apart along a ray, and what glows at
+/// most half of one. A velocity blurs the fields themselves, see FieldMotion: every sample is then the mean
+/// of those on its way, half a voxel apart and at most 64.
 ///
 /// Only the light is worked out on a grid, whose voxels of `voxelSize` (world units) hold the mean of 8
-/// places in each: shadows are as soft as that. Where nothing else is known, `fieldVoxelSize` for some 2
-/// pixels per voxel is a good choice. Pictures, deep ones and layers come from the field, normals and what
-/// falls on marched objects from the grid; paths see nothing but the field. Combined volumes take grids only.
-/// Cost: 8 evaluations per voxel and ranges of the voxels wherever the density varies.
-/// @throws Error as FieldDensity, bakeGrid and combine do, if there is an emission, a temperature or a
-/// velocity, or if the grid finds nothing of a field that may not be empty; Cancelled.
+/// places in each: shadows, and what glows as it lights others, are as soft as that. Where nothing else is
+/// known, `fieldVoxelSize` for some 2 pixels per voxel is a good choice. Pictures, deep ones and layers come
+/// from the fields, normals and what falls on marched objects from the grid; paths see nothing but the
+/// fields. Combined volumes take grids only. Cost: 8 evaluations per voxel and ranges of the voxels wherever
+/// the density or the emission varies.
+/// @throws Error as FieldDensity, bakeGrid and combine do, if a velocity is not finite, or if the grid finds
+/// nothing of fields that may not be empty; Cancelled.
 RenderVolume gridlessVolume(const FieldParts& parts, float voxelSize, const Progress& progress = silent());
 /// The same of a density alone.
 RenderVolume gridlessVolume(const ScalarField& density, const Box& box, float voxelSize,

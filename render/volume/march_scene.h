@@ -48,6 +48,8 @@ struct MarchScene {
   ColourBricks colour, emission;
   /// Whether steps that are known have colours of their own, in place of `colour`.
   bool hasStepColours = false;
+  /// The same of what glows, in place of `emission`.
+  bool hasStepGlow = false;
   float emissionScale = 1.0f;
   /// Multiplies the extinction, at most 1 each.
   float extinctionColour[3] = {1.0f, 1.0f, 1.0f};
@@ -66,8 +68,9 @@ struct MarchScene {
   }
   /// Where it holds, every colour is marched with opacities of its own; `colours` must be 3.
   bool isColoured() const {
-    return colour.table || hasStepColours || emission.table || hasExtinctionColour() || hasColouredShadow;
+    return colour.table || hasStepColours || glows() || hasExtinctionColour() || hasColouredShadow;
   }
+  bool glows() const { return emission.table || hasStepGlow; }
 
   /// `shadow` multiplies the extinction between light and sample, per colour.
   struct Sun : Bricks {

@@ -17,7 +17,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/volume/detail/brick_distances.h"
-#include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/field_glow.h"
 #include "nephele/render/volume/trilinear.h"
 
 namespace nephele {
@@ -85,15 +85,16 @@ void RenderVolume::measure(const CodedDensity* coded) {
 }
 
 RenderVolume RenderVolume::ofField(RenderVolume grids, std::shared_ptr<const FieldDensity> field,
-                                   std::optional<VectorField> colour) {
+                                   std::optional<VectorField> colour, std::shared_ptr<const FieldGlow> glow) {
   require(field != nullptr, "render volume: no field given");
-  require(grids.hasColour() == colour.has_value(),
-          "render volume: a colour is needed both as a field and as grids");
-  require(!grids.isEmpty() || field->isEmpty(),
+  require(grids.hasColour() == colour.has_value() && grids.hasEmission() == (glow != nullptr),
+          "render volume: a colour and a glow are needed both as fields and as grids");
+  require(!grids.isEmpty() || (field->isEmpty() && (!glow || glow->bounds.isEmpty())),
           fmt::format("render volume: nothing of the field is found with voxels of {}; use smaller ones",
                       grids.density().voxelSize()));
   grids.field_ = std::move(field);
   grids.fieldColour_ = std::move(colour);
+  grids.fieldGlow_ = std::move(glow);
   return grids;
 }
 
@@ -302,6 +303,7 @@ std::size_t RenderVolume::memoryBytes() const {
   for (const VolumeColour::Grids* grids : {&colour_.scattering, &colour_.emission})
     for (const auto& grid : *grids) others += grid ? grid->memoryBytes() : 0;
   if (field_) others += field_->memoryBytes();
+  if (fieldGlow_) others += fieldGlow_->bounds.memoryBytes();
   const auto codedBytes =
       std::size_t(CodedBricks::estimateBytes(double(density_->poolSize()), double(density_->table().size())));
   const std::size_t given = hasSamples() ? 0 : density_->values().capacity() * sizeof(float);

@@ -16,6 +16,7 @@
 namespace nephele {
 
 class FieldDensity;
+struct FieldGlow;
 
 /// What a density may hold beside itself, on bricks laid out as its own: three grids of the same table, or
 /// nulls. Values below zero count as zero.
@@ -45,11 +46,12 @@ class RenderVolume {
   /// as above.
   RenderVolume(std::shared_ptr<const BrickGrid> density, CodedDensity coded);
 
-  /// A density that rays ask a field for, and its colour, if it has one; `grids` stand for both wherever
-  /// light is worked out beforehand. @throws Error if they are empty and the field is not, since then nothing
-  /// would be lit, or only one of them has a colour.
+  /// A density that rays ask a field for, and its colour and its glow, if it has them; `grids` stand for all
+  /// of them wherever light is worked out beforehand. @throws Error if they are empty and the field is not,
+  /// since then nothing would be lit, or only one of them has a colour or an emission.
   static RenderVolume ofField(RenderVolume grids, std::shared_ptr<const FieldDensity> field,
-                              std::optional<VectorField> colour = std::nullopt);
+                              std::optional<VectorField> colour = std::nullopt,
+                              std::shared_ptr<const FieldGlow> glow = nullptr);
 
   const BrickGrid& density() const { return *density_; }
   /// The density as the march reads it. Made at the first call, by one thread of those that ask. Cost: one
@@ -65,6 +67,8 @@ class RenderVolume {
   const FieldDensity* field() const { return field_.get(); }
   /// Of the field, clamped to [0, 1] per colour where it is read; null where it has none.
   const VectorField* fieldColour() const { return fieldColour_ ? &*fieldColour_ : nullptr; }
+  /// Null where the field does not glow.
+  const FieldGlow* fieldGlow() const { return fieldGlow_.get(); }
   const VolumeColour& colour() const { return colour_; }
   bool hasColour() const { return colour_.scattering[0] != nullptr; }
   bool hasEmission() const { return colour_.emission[0] != nullptr; }
@@ -125,6 +129,7 @@ class RenderVolume {
   std::shared_ptr<Made> made_ = std::make_shared<Made>();
   std::shared_ptr<const FieldDensity> field_;
   std::optional<VectorField> fieldColour_;
+  std::shared_ptr<const FieldGlow> fieldGlow_;
   Vec3f meanColour_{1, 1, 1};
   std::vector<Vec3i> occupied_;
   std::vector<std::uint8_t> emptiness_, uniformity_;

@@ -197,14 +197,49 @@ TEST(Scripts, LookTheSameWithAndWithoutAGrid) {
   expectTheSame(picture(grey, "camera"), picture(grey, "exact"), "A");
   const Image camera = picture(coloured, "camera"), exact = picture(coloured, "exact");
   for (const char* channel : {"R", "G", "B", "A"}) expectTheSame(camera, exact, channel);
-  writeScript(
-      script,
-      "scalarfield density = mask(sphere((0,0,0), 1), 0.2);\nvectorfield emission = density * (1,1,1);\n");
-  const ProgramResult glowing =
-      runProgram("render " + script + " -o " + folder.file("a.exr") + " --detail exact");
-  EXPECT_EQ(glowing.exitCode, 1);
-  EXPECT_NE(glowing.errors.find("without emission, temperature or velocity"), std::string::npos)
-      << glowing.errors;
+}
+
+// What glows by its heat, and is blurred by its motion while the shutter is open.
+TEST(Scripts, GlowAndMoveTheSameWithAndWithoutAGrid) {
+  const TemporaryFolder folder;
+  const std::string script = folder.file("fire.felt");
+  writeScript(script,
+              "scalarfield ball = sphere((0,0,0), 0.6) + 0.1 * perlin(3);\n"
+              "scalarfield density = mask(ball, 0.2);\n"
+              "domain bounds = domain((-0.8, -0.8, -0.8), (1.6, 1.6, 1.6), 0.02);\n"
+              "scalarfield temperature = 2200 * mask(ball - 0.2, 0.2);\n"
+              "vectorfield velocity = (12, 0, 0);\nfloat extinction = 4;\n");
+  const auto picture = [&](const std::string& detail, const std::string& shutter) {
+    return seen(
+        folder, script,
+        "--size 48x36 --samples 4 --camera-position 0,0,4 --look-at 0,0,0 --sky 0.1,0.1,0.1 --sun none " +
+            shutter + " --detail " + detail);
+  };
+  const auto difference = [](const Image& a, const Image& b, const char* channel) {
+    double sum = 0, total = 0;
+    for (std::size_t i = 0; i < a.find(channel)->values.size(); ++i) {
+      sum += std::abs(double(a.find(channel)->values[i] - b.find(channel)->values[i]));
+      total += double(b.find(channel)->values[i]);
+    }
+    EXPECT_GT(total, 1) << channel;
+    return sum / total;
+  };
+  const std::string open = "--shutter -0.5,0.5";
+  const Image still = picture("exact", ""), moving = picture("exact", open);
+  for (const char* channel : {"R", "G", "A"}) {
+    EXPECT_LT(difference(picture("camera", ""), still, channel), 0.03);
+    EXPECT_LT(difference(picture("camera", open), moving, channel), 0.03);
+    EXPECT_GT(difference(still, moving, channel), 0.1);
+  }
+  // Of a temperature that no fire has, both say the same.
+  writeScript(script,
+              "scalarfield density = mask(sphere((0,0,0), 1));\nscalarfield temperature = 3e5 * density;\n");
+  for (const std::string detail : {"camera", "exact"}) {
+    const ProgramResult hot =
+        runProgram("render " + script + " -o " + folder.file("a.exr") + " --detail " + detail);
+    EXPECT_EQ(hot.exitCode, 1);
+    EXPECT_NE(hot.errors.find("more than 100000 K"), std::string::npos) << hot.errors;
+  }
 }
 
 // In a sky alone, what is seen is in proportion to its radiance, and no brighter where the medium scatters

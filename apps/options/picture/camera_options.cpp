@@ -264,8 +264,9 @@ Camera CameraOptions::camera(double framesLater) const {
     refuseValue("--crop", fmt::format("{},{},{},{}", c->x0, c->y0, c->x1, c->y1),
                 fmt::format("within the picture, 0,0,{},{}", frame.width, frame.height));
   if (!shutter.isInstant() && file.empty() && !volumeMotion && !volumeFlows)
-    throw CLI::ValidationError("--shutter",
-                               "nothing moves; give --camera, --volume-motion or --velocity-grid");
+    throw CLI::ValidationError(
+        "--shutter",
+        "nothing moves; give --camera, --volume-motion, --velocity-grid or a script with a velocity");
   if (volumeMotion && shutter.isInstant())
     throw CLI::ValidationError("--volume-motion", "shows only while the shutter is open; give --shutter");
   Placement placement(*this);

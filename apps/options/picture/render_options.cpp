@@ -170,7 +170,7 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
     if (result.dropsMeanDepth_) result.render.aovs.push_back("Z_mean");
   }
   result.render.shutter = shutter;
-  result.volumeFlows = !volumes.velocityGrids.empty();
+  result.volumeFlows = volumeFlows || !volumes.velocityGrids.empty();
   result.render.volumeMotion = result.motion();
   if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
     result.render.nextCamera = result.laterCamera(1);

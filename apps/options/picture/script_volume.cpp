@@ -153,18 +153,15 @@ ScriptVolume::ScriptVolume(const std::string& path, const ScriptOptions& options
   extinction_ = scene.extinction;
   sky_ = scene.sky;
   sun_ = scene.sun;
-  suggestTo(picture);
   parts_ = std::move(scene.parts);
-  if (isExact_ && (parts_.emission || parts_.velocity || parts_.temperature))
-    throw Error(path +
-                ": --detail exact shows a density and its color, without emission, temperature or velocity; "
-                "--detail camera shows them");
+  suggestTo(picture);
 }
 
 void ScriptVolume::suggestTo(PictureOptions& picture) const {
   if (extinction_ && !picture.extinction) picture.extinction = float(*extinction_);
   if (sky_) picture.light.suggestSky(felt::toFloat(*sky_));
   if (sun_) picture.light.suggestSun(sun_->x, sun_->y, sun_->z);
+  if (parts_.velocity) picture.volumeFlows = true;
 }
 
 RenderVolume ScriptVolume::forCameraOf(const PictureOptions& picture, Run& run) {

@@ -85,10 +85,12 @@ class Marcher {
 
   // What steps weigh in the picture, by their own optical depths and those behind them: the transmittance
   // that each takes away, and nothing where the ray is as good as opaque. Adds what glows in them.
-  HWY_INLINE void weigh(Floats own, Floats after, Floats seen, LitPart<kColours>& steps);
+  // `first` is which step of the block the first of them is.
+  HWY_INLINE void weigh(int first, Floats own, Floats after, Floats seen, LitPart<kColours>& steps);
 
   // T (1 - exp(-t)) / t, by its series where the difference would lose its digits.
-  void glow(Floats own, const Floats (&before)[kColours], Floats seen, const LitPart<kColours>& steps);
+  void glow(int first, Floats own, const Floats (&before)[kColours], Floats seen,
+            const LitPart<kColours>& steps);
 
   void colour(Floats own, LitPart<kColours>& steps);
 
@@ -131,6 +133,7 @@ class Marcher {
   alignas(64) float known_[kBlock] = {};
   // Of steps that have them.
   alignas(64) float colours_[kColours][kBlock] = {};
+  alignas(64) float glows_[kColours][kBlock] = {};
   int count_ = 0;
   float depth_ = 0.0f;
   // What is left of light from behind, per colour.

@@ -18,7 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
 template <int kColours>
-HWY_INLINE void Marcher<kColours>::weigh(Floats own, Floats after, Floats seen, LitPart<kColours>& steps) {
+HWY_INLINE void Marcher<kColours>::weigh(int first, Floats own, Floats after, Floats seen,
+                                         LitPart<kColours>& steps) {
   const Lanes d;
   Floats before[kColours];
   for (int c = 0; c != kColours; ++c) {
@@ -33,7 +34,7 @@ HWY_INLINE void Marcher<kColours>::weigh(Floats own, Floats after, Floats seen, 
   const auto isSeen = hn::Gt(most, hn::Set(d, scene_.cutoff));
   for (Floats& weight : steps.weight) weight = hn::IfThenElseZero(isSeen, weight);
   if constexpr (kColours == 3) {
-    if (scene_.emission.table) glow(own, before, seen, steps);
+    if (scene_.glows()) glow(first, own, before, seen, steps);
     if (scene_.colour.table) colour(own, steps);
   }
   if (isHeld_)
@@ -41,11 +42,14 @@ HWY_INLINE void Marcher<kColours>::weigh(Floats own, Floats after, Floats seen, 
 }
 
 template <int kColours>
-inline void Marcher<kColours>::glow(Floats own, const Floats (&before)[kColours], Floats seen,
+inline void Marcher<kColours>::glow(int first, Floats own, const Floats (&before)[kColours], Floats seen,
                                     const LitPart<kColours>& steps) {
   const Lanes d;
   Floats glow[3];
-  sampleColour(scene_.emission, pointAt(ray_.density, steps.s), glow);
+  if (scene_.hasStepGlow)
+    for (int c = 0; c != 3; ++c) glow[c] = hn::Load(d, glows_[c] + first);
+  else
+    sampleColour(scene_.emission, pointAt(ray_.density, steps.s), glow);
   const Floats step = hn::Mul(steps.length, hn::Set(d, scene_.extinction * scene_.emissionScale));
   for (int c = 0; c != 3; ++c) {
     const Floats t = hn::Mul(own, hn::Set(d, scene_.extinctionColour[c]));

@@ -55,7 +55,7 @@ inline void Marcher<kColours>::record(float before, const float* after, int used
   mark();
   float opacity = record_->steps.empty() ? 0.0f : record_->steps.back().opacity;
   for (int i = 0; i != used; ++i) {
-    if (after[i] == before && !scene_.emission.table) continue;
+    if (after[i] == before && !scene_.glows()) continue;
     const float gain = scene_.meanOpacity(after[i]) - scene_.meanOpacity(before);
     opacity = isHeld_ ? opacity + seen_[i] * gain : scene_.meanOpacity(after[i]);
     record_->steps.push_back({begin_[i], begin_[i] + ds_[i], opacity});

@@ -55,7 +55,10 @@ inline bool Marcher<kColours>::take(const MarchStep& step) {
   known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
   someKnown_ = true;
   if constexpr (kColours == 3)
-    for (int c = 0; c != 3; ++c) colours_[c][count_] = step.colour[c];
+    for (int c = 0; c != 3; ++c) {
+      colours_[c][count_] = step.colour[c];
+      glows_[c][count_] = step.glow[c];
+    }
   return ++count_ != kBlock || (flush() && !isHidden_);
 }
 
@@ -78,7 +81,7 @@ inline bool Marcher<kColours>::flush() {
   if (std::exchange(someKnown_, false)) takeKnown(end, needsLookUp, own);
   Floats most = hn::Zero(d);
   for (int i = 0; i != end; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
-  if (!scene_.emission.table && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
+  if (!scene_.glows() && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
   const float before = depth_;
   Floats behind = hn::Set(d, depth_);
   for (int i = 0; i != end; i += kLanes) {
@@ -100,8 +103,8 @@ inline bool Marcher<kColours>::flush() {
 
   for (int i = 0; i != end; i += kLanes) {
     LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
-    weigh(hn::Load(d, own + i), hn::Load(d, after + i), isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f),
-          steps);
+    weigh(i, hn::Load(d, own + i), hn::Load(d, after + i),
+          isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f), steps);
     if constexpr (kColours == 3)
       for (int c = 0; c != 3 && scene_.hasStepColours; ++c)
         steps.weight[c] = hn::Mul(steps.weight[c], hn::Load(d, colours_[c] + i));

@@ -24,13 +24,13 @@ float largest(const Vec3f& v) {
 
 // Follows a way from where it enters the field, if it does.
 void PathVolume::follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,
-                        Scratch& scratch) const {
+                        const FieldGlow* glow, Scratch& scratch) const {
   const RaySpan span = clipped({0, length}, ray.origin, ray.direction, bounds_);
   if (span.isEmpty()) return;
   const FieldDensity::Line line{Vec3f(ray.origin + ray.direction * span.near), Vec3f(ray.direction),
                                 float(span.far - span.near)};
   Scratch::Track& track = scratch.tracks.emplace_back(
-      Scratch::Track{way, span.near, line, FieldDensity::Walk(*field_, line), random});
+      Scratch::Track{way, span.near, line, GlowingWalk(*field_, glow, line), random});
   track.depth = track.random.depth();
 }
 
@@ -45,8 +45,11 @@ bool PathVolume::advance(Scratch::Track& track, float extinction, bool isResidua
       Interval& range = track.span.range;
       range = {std::min(range.min, mostDensity_), std::min(range.max, mostDensity_)};
     }
-    const float least = isResidual ? track.span.range.min : 0.0f,
-                bound = extinction * (track.span.range.max - least), step = track.depth / bound;
+    const float least = isResidual ? track.span.range.min : 0.0f;
+    float bound = extinction * (track.span.range.max - least);
+    if (track.span.glows) bound = std::max(bound, leastBound_);
+    track.bound = bound;
+    const float step = track.depth / bound;
     if (track.s + step < track.span.end) {
       track.passed += extinction * least * step;
       track.s += step;
@@ -57,6 +60,29 @@ bool PathVolume::advance(Scratch::Track& track, float extinction, bool isResidua
     track.passed += extinction * least * rest;
     track.depth = std::max(0.0f, track.depth - rest * bound);
     track.hasSpan = false;
+  }
+}
+
+// Finds what glows at tentative collisions.
+void PathVolume::askGlow(Scratch& scratch) const {
+  std::size_t count = 0;
+  for (const Scratch::Tentative& tentative : scratch.tentative) count += tentative.glows;
+  for (std::vector<float>& lane : scratch.glow) lane.resize(count);
+  std::size_t next = 0;
+  for (const Scratch::Track& track : scratch.tracks)
+    for (std::size_t i = track.first; i != track.end; ++i) {
+      if (!scratch.tentative[i].glows) continue;
+      const Vec3f place = track.line.at(scratch.tentative[i].s);
+      for (int axis = 0; axis != 3; ++axis) scratch.glow[std::size_t(axis)][next] = place[axis];
+      ++next;
+    }
+  const auto& [x, y, z, red, green, blue] = scratch.glow;
+  fieldGlow_->emission.eval({x, y, z}, {{scratch.glow[3], scratch.glow[4], scratch.glow[5]}});
+  next = 0;
+  for (Scratch::Tentative& tentative : scratch.tentative) {
+    if (!tentative.glows) continue;
+    tentative.glow = FieldGlow::counted({red[next], green[next], blue[next]});
+    ++next;
   }
 }
 
@@ -72,6 +98,7 @@ void PathVolume::followAll(Scratch& scratch, Lay&& lay, Answer&& answer) const {
       while (scratch.tentative.size() != track.first + ahead && !track.isAtEnd) lay(track);
       track.end = scratch.tentative.size();
     }
+    if (fieldGlow_) askGlow(scratch);
     const float* value = scratch.batch.eval(*field_).data();
     for (Scratch::Track& track : scratch.tracks) {
       track.isDone = false;
@@ -89,7 +116,8 @@ void PathVolume::followAll(Scratch& scratch, Lay&& lay, Answer&& answer) const {
 void PathVolume::flyThroughField(std::span<Flight> flights, Scratch& scratch) const {
   scratch.tracks.clear();
   for (std::size_t i = 0; i != flights.size(); ++i)
-    follow(std::uint32_t(i), flights[i].ray, flights[i].length, flights[i].random.fork(), scratch);
+    follow(std::uint32_t(i), flights[i].ray, flights[i].length, flights[i].random.fork(), fieldGlow_,
+           scratch);
   const auto lay = [&](Scratch::Track& track) {
     if (!advance(track, extinction_, false)) {
       track.isAtEnd = true;
@@ -100,15 +128,19 @@ void PathVolume::flyThroughField(std::span<Flight> flights, Scratch& scratch) co
     // Whatever the density is, it is real; nothing behind it matters.
     const bool isSure = !isColoured_ && chance * range.max < range.min;
     track.isAtEnd = isSure;
-    scratch.tentative.push_back({track.s, 0, range, chance, !isSure && !range.isPoint()});
+    scratch.tentative.push_back(
+        {track.s, 0, range, chance, !isSure && !range.isPoint(), track.bound, track.span.glows});
     if (scratch.tentative.back().isAsked) scratch.batch.add(*field_, track.line, track.s, track.span.region);
   };
   followAll(scratch, lay, [&](const Scratch::Track& track, const Scratch::Tentative& t, float density) {
     Flight& flight = flights[track.way];
     const double distance = track.start + double(t.s);
-    const float share = density / t.range.max;
-    if (isColoured_) return !isReal(flight, colour_ * std::min(share, 1.0f), distance);
-    if (!(t.chance < share)) return true;
+    if (isColoured_) {
+      if (!(flight.weight.x + flight.weight.y + flight.weight.z > 0)) return false;
+      if (t.glows) addGlow(flight, t.glow, t.bound, distance);
+      return !isReal(flight, colour_ * std::min(extinction_ * density / t.bound, 1.0f), distance);
+    }
+    if (!(t.chance < density / t.range.max)) return true;
     flight.distance = distance;
     return false;
   });
@@ -118,7 +150,7 @@ void PathVolume::lookThroughField(std::span<ShadowWay> ways, Scratch& scratch) c
   scratch.tracks.clear();
   for (std::size_t i = 0; i != ways.size(); ++i)
     if (largest(ways[i].extinction) > 0)
-      follow(std::uint32_t(i), ways[i].ray, ways[i].length, ways[i].random.fork(), scratch);
+      follow(std::uint32_t(i), ways[i].ray, ways[i].length, ways[i].random.fork(), nullptr, scratch);
   const auto lay = [&](Scratch::Track& track) {
     track.isAtEnd = !advance(track, extinction_ * largest(ways[track.way].extinction), true);
     // What was passed to the end is a tentative collision with nothing.

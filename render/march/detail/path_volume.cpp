@@ -48,6 +48,7 @@ struct PathVolume::Part {
 PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
     : field_(volume.field()),
       fieldColour_(volume.fieldColour()),
+      fieldGlow_(volume.fieldGlow()),
       density_{volume.density().values().data(), volume.density().table().data(),
                volume.density().brickCount()},
       toLattice_(volume.density().worldToIndex(), volume.density().firstBrick()),
@@ -69,7 +70,7 @@ PathVolume::PathVolume(const RenderVolume& volume, const Medium& medium)
   if (volume.hasColour()) take(volume.colour().scattering, scene_.colour);
   if (volume.hasEmission()) {
     take(volume.colour().emission, scene_.emission);
-    leastBound_ = 1 / (BrickGrid::kBrick * grid.voxelSize());
+    leastBound_ = 1 / (BrickGrid::kBrick * (field_ ? field_->cell() : grid.voxelSize()));
   }
   isColoured_ = volume.hasEmission() || colour_ != Vec3f{1, 1, 1};
   const float size = field_ ? field_->cell() : grid.voxelSize();
@@ -208,6 +209,14 @@ bool PathVolume::isReal(Flight& flight, const Vec3f& real, double distance) {
   return false;
 }
 
+void PathVolume::addGlow(Flight& flight, const Vec3f& emission, float bound, double distance) const {
+  const float held = flight.foreground ? flight.foreground->heldAt(distance) : 1.0f;
+  const Vec3f glow = flight.weight * emission * (held * perEmission_ / bound);
+  flight.glow += Vec3d(glow);
+  if (flight.foreground && flight.foreground->glow && glow != Vec3f{})
+    flight.foreground->glow->push_back({float(distance * flight.foreground->cosine), 0, glow});
+}
+
 // Where colours differ in extinction, or something glows: at each tentative collision the path sees what
 // glows there per extinction.
 void PathVolume::flyInColours(const Part& part, Flight& flight) const {
@@ -219,14 +228,9 @@ void PathVolume::flyInColours(const Part& part, Flight& flight) const {
         const double distance = part.start + double(s);
         if (!(flight.weight.x + flight.weight.y + flight.weight.z > 0)) return false;
         if (scene_.emission.table) {
-          const float held = flight.foreground ? flight.foreground->heldAt(distance) : 1.0f;
-          Vec3f glow;
-          for (int c = 0; c != 3; ++c)
-            glow[c] = held * flight.weight[c] * perEmission_ / bound *
-                      valueAt(scene_.emission.values[c], scene_.emission, p);
-          flight.glow += Vec3d(glow);
-          if (flight.foreground && flight.foreground->glow && glow != Vec3f{})
-            flight.foreground->glow->push_back({float(distance * flight.foreground->cosine), 0, glow});
+          Vec3f emission;
+          for (int c = 0; c != 3; ++c) emission[c] = valueAt(scene_.emission.values[c], scene_.emission, p);
+          addGlow(flight, emission, bound, distance);
         }
         return !isReal(flight, colour_ * std::fmin(extinction_ * densityAt(p) / bound, 1.0f), distance);
       },

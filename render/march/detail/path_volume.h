@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,7 +12,7 @@
 #include "nephele/render/march/detail/path_ways.h"
 #include "nephele/render/scene/camera.h"
 #include "nephele/render/scene/medium.h"
-#include "nephele/render/volume/field_density.h"
+#include "nephele/render/volume/field_glow.h"
 #include "nephele/render/volume/lattice_map.h"
 #include "nephele/render/volume/march_scene.h"
 #include "nephele/render/volume/render_volume.h"
@@ -35,6 +36,8 @@ class PathVolume {
     std::vector<Track> tracks;
     std::vector<Tentative> tentative;
     FieldDensity::Batch batch;
+    // Places that may glow, and the light there.
+    std::array<std::vector<float>, 6> glow;
   };
 
   /// What becomes of one way does not depend on the others.
@@ -71,6 +74,8 @@ class PathVolume {
   // each weight makes up for it (spectral tracking, Kutz, Habel, Li and Novak 2017). `real`: how likely it is
   // to each of them.
   static bool isReal(Flight& flight, const Vec3f& real, double distance);
+  // Adds what glows at a tentative collision, over the bound that it was drawn for.
+  void addGlow(Flight& flight, const Vec3f& emission, float bound, double distance) const;
   // How much of the largest density above the least one a density is.
   static float residualOf(float density, const Interval& range) {
     return std::clamp((density - range.min) / (range.max - range.min), 0.0f, 1.0f);
@@ -84,8 +89,9 @@ class PathVolume {
   static void dim(ShadowWay& way, float depth);
 
   void follow(std::uint32_t way, const Ray& ray, double length, const PathRandom& random,
-              Scratch& scratch) const;
+              const FieldGlow* glow, Scratch& scratch) const;
   bool advance(Scratch::Track& track, float extinction, bool isResidual) const;
+  void askGlow(Scratch& scratch) const;
   template <class Lay, class Answer>
   void followAll(Scratch& scratch, Lay&& lay, Answer&& answer) const;
   void flyThroughField(std::span<Flight> flights, Scratch& scratch) const;
@@ -93,6 +99,7 @@ class PathVolume {
 
   const FieldDensity* field_ = nullptr;
   const VectorField* fieldColour_ = nullptr;
+  const FieldGlow* fieldGlow_ = nullptr;
   GridSampler density_;
   MarchScene scene_;
   LatticeMap toLattice_;
@@ -113,11 +120,12 @@ struct PathVolume::Scratch::Track {
   std::uint32_t way;
   double start;
   FieldDensity::Line line;
-  FieldDensity::Walk walk;
+  GlowingWalk walk;
   PathRandom random;
-  // The part of the line that is being crossed, where on it, and the optical depth to the next tentative
-  // collision.
-  FieldDensity::Span span{};
+  // The part of the line that is being crossed, the extinction that collisions are drawn for there, where on
+  // it, and the optical depth to the next tentative collision.
+  GlowingWalk::Span span{};
+  float bound = 0.0f;
   bool hasSpan = false;
   float s = 0.0f, depth = 0.0f;
   // Optical depth that was passed without doubt since the last tentative collision.
@@ -135,6 +143,10 @@ struct PathVolume::Scratch::Tentative {
   // In [0, 1).
   float chance;
   bool isAsked;
+  // Extinction that it was drawn for; whether something may glow there, and what does.
+  float bound = 0.0f;
+  bool glows = false;
+  Vec3f glow{};
 };
 
 }  // namespace nephele::detail

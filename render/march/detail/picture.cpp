@@ -28,7 +28,7 @@ MarchScene Picture::withoutLight(MarchScene scene) {
   scene.locals.clear();
   scene.scattered.clear();
   scene.colour = scene.emission = {};
-  scene.hasStepColours = false;
+  scene.hasStepColours = scene.hasStepGlow = false;
   return scene;
 }
 
@@ -88,10 +88,13 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
     fieldSteps_.lightDepth = scene_.stepDepth * finer;
     fieldSteps_.lightLength = lit.voxelSize * finer;
     fieldColour_ = lit.source->fieldColour();
-    // Beside a near light, and with colours, what is seen varies where the density does not.
-    const bool isEven = scene_.locals.empty() && !fieldColour_;
+    fieldGlow_ = lit.source->fieldGlow();
+    if (fieldGlow_) fieldSteps_.lightLength *= 0.5f;
+    // Beside a near light, and with colours or a glow, what is seen varies where the density does not.
+    const bool isEven = scene_.locals.empty() && !fieldColour_ && !fieldGlow_;
     fieldSteps_.uniformLength = isEven ? 4 * lit.voxelSize * finer : fieldSteps_.lightLength;
     if (fieldColour_) scene_.colour = {}, scene_.hasStepColours = true;
+    if (fieldGlow_) scene_.emission = {}, scene_.hasStepGlow = true;
   }
   shadowScene_ = withoutLight(scene_);
   shadowScene_.pixelAngle = 0;
@@ -192,7 +195,7 @@ void Picture::marchAll(const MarchScene& scene, std::size_t count, bool isRecord
   const std::span<MarchResult> results{scratch.results.data(), count};
   const std::span<MarchRecord> records{scratch.records.data(), isRecorded ? count : 0};
   if (field_) {
-    if (!scratch.field) scratch.field.emplace(*field_, fieldSteps_, fieldColour_);
+    if (!scratch.field) scratch.field.emplace(*field_, fieldSteps_, fieldColour_, fieldGlow_);
     scratch.field->march(scene, rays, results, records);
   } else {
     marchRays(scene, rays, results, records);

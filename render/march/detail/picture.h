@@ -91,6 +91,7 @@ class Picture {
   // Null where the density is a grid.
   const FieldDensity* field_ = nullptr;
   const VectorField* fieldColour_ = nullptr;
+  const FieldGlow* fieldGlow_ = nullptr;
   FieldSteps fieldSteps_;
   bool isDeep_ = false;
   const Holdout* holdout_ = nullptr;

@@ -153,10 +153,7 @@ TEST(FieldColour, IsKeptWithinWhatItMayBe) {
   EXPECT_NEAR(found.z / all.z, 1, 2e-3);
 }
 
-TEST(FieldColour, WhatNeedsAGridIsRefused) {
-  EXPECT_THROW(
-      gridlessVolume({.density = ball(), .box = kBox, .emission = VectorField(Vec3f{1, 1, 1})}, kVoxel),
-      Error);
+TEST(FieldColour, AShareBelow0IsRefused) {
   EXPECT_THROW(gridlessVolume({.density = ball(), .box = kBox, .share = -1}, kVoxel), Error);
 }
 

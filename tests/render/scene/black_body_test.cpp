@@ -4,6 +4,9 @@
 
 #include <cmath>
 
+#include "nephele/modeling/field/operations.h"
+#include "nephele/modeling/field/space.h"
+
 namespace nephele {
 namespace {
 
@@ -47,6 +50,21 @@ TEST(BlackBody, IsDarkAtZeroAndNeverNegative) {
       EXPECT_LE(colour.x, colour.z);
     }
   }
+}
+
+TEST(BlackBody, IsAFieldOfATemperature) {
+  const VectorField glow = blackBody(1000.0f * component(position(), 0), 4000);
+  for (const float kelvin : {1200.0f, 2000.0f, 3999.0f}) {
+    const Vec3f found = glow({kelvin / 1000, 0, 0}), expected = blackBody(double(kelvin));
+    for (int c = 0; c != 3; ++c) {
+      // Within the table's steps.
+      EXPECT_NEAR(found[c], expected[c], 1e-3f * expected[c] + 1e-6f);
+      EXPECT_TRUE(glow.range({{0.5f, 0, 0}, {kelvin / 1000, 1, 1}})[std::size_t(c)].contains(found[c]));
+    }
+  }
+  EXPECT_EQ(glow({9, 0, 0}), glow({4, 0, 0}));
+  EXPECT_EQ(glow({-1, 0, 0}), Vec3f{});
+  EXPECT_EQ(glow.range({{-2, 0, 0}, {0, 1, 1}})[0], Interval::of(0));
 }
 
 }  // namespace
