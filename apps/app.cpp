@@ -111,6 +111,8 @@ bool given(const CLI::App& app, const char* name) {
 /// What a command line stands for: its arguments, and the calls that it makes of them.
 struct Line {
   std::vector<std::string> arguments;
+  /// Those that were typed, without what files and looks set.
+  std::vector<std::string> typed{};
   /// One for each value of the wedge, or one.
   std::vector<Sequence> sequences{};
   std::optional<Wedge> wedge{};
@@ -229,8 +231,7 @@ std::vector<MadeCall> shownOf(const Line& line, std::vector<MadeCall> made) {
   return shown;
 }
 
-/// What the command line asks for.
-void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramRun& run) {
+void carryOut(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramRun& run) {
   check(command, line, run);
   if (!line.isSeveral()) return command.bound.body(run);
   const CommonOptions& options = command.options;
@@ -240,6 +241,19 @@ void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramR
   writeCallSheet(options.contactSheet, shownOf(line, std::move(made)),
                  line.wedge ? line.wedge->columns() : std::nullopt,
                  *std::ranges::find(verbs, "render", &Verb::name), run);
+}
+
+/// What the command line asks for.
+void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramRun& run) {
+  try {
+    carryOut(command, line, verbs, run);
+  } catch (const std::exception& error) {
+    if (command.verb.passesOthersOn) throw;
+    const std::vector<std::string> names = namesOf(verbs);
+    if (const auto shown = shownInConfigFile({command.app, command.verb.name, names}, line.typed, error))
+      throw *shown;
+    throw;
+  }
 }
 
 /// What `arguments` stand for; `command` has read those of its first call.
@@ -253,6 +267,7 @@ Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<st
   };
   arguments = withCurrentNames(name, withFilesAfterDashes(std::move(arguments)), note);
   Line line = lineOf(command, arguments, withSettings);
+  line.typed = arguments;
   const std::vector<std::string> settings = withSettings(arguments);
   line.configOptions = typedLine(std::span(settings).subspan(arguments.size()));
   try {

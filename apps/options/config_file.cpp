@@ -117,6 +117,12 @@ std::vector<Setting> settingsOf(const ConfiguredVerb& verb, TomlFile& file,
   return settings;
 }
 
+// "--layers: got '99'" as the file says it.
+std::string inFile(const Setting& setting, const std::string& message) {
+  const std::string start = "--" + setting.name;
+  return message.starts_with(start) ? setting.name + message.substr(start.size()) : message;
+}
+
 // The value of one option alone, as an app reads it that has read nothing yet.
 void check(const TomlFile& file, const Setting& setting, CLI::App& fresh) {
   CLI::Option* option = fresh.get_option_no_throw("--" + setting.name);
@@ -130,11 +136,19 @@ void check(const TomlFile& file, const Setting& setting, CLI::App& fresh) {
     } catch (const felt::ScriptError& error) {
       throw text()->moved(error, 1);
     } catch (const CLI::ParseError& error) {
-      const std::string message = error.what(), start = "--" + setting.name;
-      throw text()->fault(felt::Code::outOfRange,
-                          message.starts_with(start) ? setting.name + message.substr(start.size()) : message);
+      throw text()->fault(felt::Code::outOfRange, inFile(setting, error.what()));
     }
   }
+}
+
+// Which of the values of an option a message is about: the one that it shows, or the only one.
+const Setting::Value* valueIn(const Setting& setting, const std::string& message, bool isOfExpression) {
+  for (const Setting::Value& value : setting.values) {
+    const std::string shown =
+        isOfExpression && value.text.starts_with('=') ? value.text.substr(1) : value.text;
+    if (message.find(shown.substr(0, shown.find('\n'))) != std::string::npos) return &value;
+  }
+  return !isOfExpression && setting.values.size() == 1 ? &setting.values.front() : nullptr;
 }
 
 // What a look says of the verb, but for what does not go with what was typed: it is the look of another
@@ -195,6 +209,26 @@ void checkConfigFile(const ConfiguredVerb& verb, const std::vector<std::string>&
   for (const Setting& setting : settingsOf(verb, file, arguments))
     file.collect([&] { check(file, setting, fresh); });
   file.throwFaults();
+}
+
+std::optional<felt::ScriptError> shownInConfigFile(const ConfiguredVerb& verb,
+                                                   const std::vector<std::string>& arguments,
+                                                   const std::exception& error) {
+  const std::string message = error.what();
+  const std::optional<std::string> path = givenTo("--config", arguments);
+  if (!path || !message.starts_with("--")) return std::nullopt;
+  const auto* expression = dynamic_cast<const felt::ScriptError*>(&error);
+  TomlFile file = TomlFile::read("--config", *path);
+  for (const Setting& setting : settingsOf(verb, file, arguments)) {
+    if (!message.starts_with("--" + setting.name + ":")) continue;
+    const Setting::Value* value = valueIn(setting, message, expression != nullptr);
+    if (!value) return std::nullopt;
+    const auto text = file.textOf(value->node, value->text);
+    if (expression) return text->moved(*expression, 1);
+    const bool isOfUse = dynamic_cast<const CLI::Error*>(&error) != nullptr;
+    return text->fault(isOfUse ? felt::Code::outOfRange : felt::Code::failed, inFile(setting, message));
+  }
+  return std::nullopt;
 }
 
 }  // namespace nephele::apps

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "nephele/modeling/felt/diagnostic.h"
 
 namespace nephele::apps {
 
@@ -26,6 +29,13 @@ std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<
 /// shown in it then. `fresh` is the verb's app, which must not be used any more.
 /// @throws felt::ScriptError with all of them.
 void checkConfigFile(const ConfiguredVerb& verb, const std::vector<std::string>& arguments, CLI::App& fresh);
+
+/// What a run has thrown, shown where the file of --config gives the value that is at fault: what is wrong
+/// with an expression, and what is said of an option, shows in some cases only when it is made use of.
+/// Nothing where the value is not of the file. `arguments` are those that were typed.
+std::optional<felt::ScriptError> shownInConfigFile(const ConfiguredVerb& verb,
+                                                   const std::vector<std::string>& arguments,
+                                                   const std::exception& error);
 
 /// The last text that `arguments` give to an option, as words of their own or behind an equals sign.
 std::optional<std::string> givenTo(const std::string& option, const std::vector<std::string>& arguments);

@@ -88,6 +88,8 @@ class Entry {
     return fieldOf(isFile ? "mask:" + typed + ":0,1" : typed, {.low = 0, .high = 1});
   }
 
+  std::shared_ptr<const TomlText> place() const { return file_.textOf(value_, {}); }
+
   const std::string key;
   const toml::node& value() const { return value_; }
   TomlFile& file() const { return file_; }
@@ -140,7 +142,11 @@ SpectrumOptions spectrumOf(const Entry& table) {
 void set(LayerRecipe& layer, const Entry& entry) {
   const std::string& key = entry.key;
   if (key == "noise") return void(layer.noise = entry.kind());
-  if (key == "spectrum") return void(layer.spectrum = spectrumOf(entry));
+  if (key == "spectrum") {
+    layer.spectrum = spectrumOf(entry);
+    layer.spectrumPlace = entry.place();
+    return;
+  }
   if (key == "time") return void(layer.time = float(entry.number(-1e6, 1e6)));
   if (key == "period") return void(layer.period = float(entry.number(1e-3, 1e6)));
   if (key == "seed") return void(layer.seed = std::uint32_t(entry.count(0, 1 << 30)));
@@ -196,8 +202,10 @@ CumuloLayer layerOf(const LayerRecipe& recipe, int index, const CumuloFractal& f
   if (recipe.spectrum) own.noise.spectrum = *recipe.spectrum;
   if (recipe.time) own.noise.time = recipe.time;
   if (recipe.period) own.noise.period = recipe.period;
-  require(!recipe.spectrum || own.noise.kind == NoiseKind::spectral,
-          fmt::format("only noise = \"fft\" has a spectrum, not \"{}\"", noiseName(own.noise.kind)));
+  if (recipe.spectrum && own.noise.kind != NoiseKind::spectral)
+    throw recipe.spectrumPlace->fault(
+        felt::Code::outOfRange,
+        fmt::format("only noise = \"fft\" has a spectrum, not \"{}\"", noiseName(own.noise.kind)));
   return cumuloLayer(own);
 }
 
@@ -244,7 +252,9 @@ std::vector<LayerRecipe> readLayerRecipe(const std::string& path) {
     });
   }
   file.throwFaults();
-  if (layers.empty()) throw CLI::ValidationError("--recipe", path + ": has no [[layer]]");
+  if (layers.empty())
+    file.refuse(felt::Code::expected, {{1, 1}, {1, 1}, nullptr}, "there is no layer",
+                "each begins with a line [[layer]]");
   return layers;
 }
 

@@ -17,6 +17,8 @@ struct LayerRecipe {
   std::string text;
   std::optional<NoiseKind> noise;
   std::optional<SpectrumOptions> spectrum;
+  /// Where that stands.
+  std::shared_ptr<const TomlText> spectrumPlace;
   std::optional<float> time, period;
   std::optional<std::uint32_t> seed;
   int octaves = 1;
@@ -35,7 +37,7 @@ struct LayerRecipe {
 };
 
 /// Reads the recipe of all layers. @throws felt::ScriptError with all that is wrong with it, shown in the
-/// file; CLI::ValidationError where it cannot be read or has no layers.
+/// file, also that it has no layers; CLI::ValidationError where it cannot be read.
 std::vector<LayerRecipe> readLayerRecipe(const std::string& path);
 
 /// Whether a TOML file has layers, and not options. @throws felt::ScriptError where it is no TOML;

@@ -124,7 +124,10 @@ TEST(TomlMessages, OfRecipesAreExactlyThese) {
   EXPECT_EQ(messageOf("--recipe", many),
             "a.toml:17:1: error: there are 17 layers, allowed: 1 to 16\n  [[layer]]\n  ^~~~~~~~~\n");
   EXPECT_EQ(messageOf("--recipe", "# nothing\n"),
-            "nephele cloud: error: --recipe: a.toml: has no [[layer]]\nTry 'nephele cloud --help'.\n");
+            "a.toml:1:1: error: there is no layer\n  # nothing\n  ^\n  hint: each begins with a line "
+            "[[layer]]\n");
+  EXPECT_EQ(messageOf("--recipe", ""),
+            "a.toml:1:1: error: there is no layer\n  \n  ^\n  hint: each begins with a line [[layer]]\n");
 }
 
 TEST(TomlMessages, OfExpressionsPointIntoTheLineOfTheFile) {
@@ -227,11 +230,12 @@ TEST(TomlMessages, AllFaultsOfAFileAreToldAtOnce) {
 TEST(TomlMessages, OfARunShowTheFile) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.toml");
-  const auto messageOfRun = [&](const std::string& toml, int exitCode) {
+  std::string option = "--recipe ";
+  const auto messageOfRun = [&](const std::string& toml, int exitCode, const std::string& others = "") {
     std::ofstream(path) << toml;
     const ProgramResult result =
         runProgram("cloud " + ownData("data/sphere_uv.obj") + " --resolution 24 -o " + folder.file("a.vdb") +
-                   " --recipe " + path);
+                   " " + option + path + others);
     EXPECT_EQ(result.exitCode, exitCode) << result.errors;
     return result.errors;
   };
@@ -250,6 +254,39 @@ TEST(TomlMessages, OfARunShowTheFile) {
           "do: uv)\n"
           "  amplitude = \"attribute:growth:0,1%\"\n"
           "              ^~~~~~~~~~~~~~~~~~~~~~~\n");
+  EXPECT_EQ(messageOfRun("[[layer]]\nspectrum = { exponent = 3 }\n", 2),
+            path +
+                ":2:12: error: only noise = \"fft\" has a spectrum, not \"perlin\"\n"
+                "  spectrum = { exponent = 3 }\n"
+                "             ^~~~~~~~~~~~~~~~\n");
+
+  option = "--config ";
+  EXPECT_EQ(messageOfRun("layers = 2\n[cloud]\nbillow = '=1/(1 - 1)'\n", 2),
+            path + ":3:12: error: division by zero\n  billow = '=1/(1 - 1)'\n             ^~~~~~~~~\n");
+  // The file is looked for where the expression is evaluated.
+  const std::string missing = messageOfRun("amplitude = '=0.1 * readfield(\"missing.vdb\")'\n", 1);
+  EXPECT_TRUE(missing.starts_with(path + ":1:21: error: missing.vdb: no such file")) << missing;
+  EXPECT_EQ(messageOfRun("billow = '=height - 2'\n", 1),
+            path +
+                ":1:10: error: billow: '=height - 2' may be from -2 to -1, allowed: a number from 0 to 100; "
+                "clamp(..., LOW, HIGH) keeps it within\n"
+                "  billow = '=height - 2'\n"
+                "           ^~~~~~~~~~~~~\n");
+  EXPECT_EQ(
+      messageOfRun("amplitude = \"attribute:growth:0,1%\"\n", 1),
+      path +
+          ":1:13: error: amplitude: the mesh has no vertex attribute 'growth'; it has none (per corner, "
+          "which will not do: uv)\n"
+          "  amplitude = \"attribute:growth:0,1%\"\n"
+          "              ^~~~~~~~~~~~~~~~~~~~~~~\n");
+  // What is typed is shown as it was typed.
+  EXPECT_TRUE(
+      messageOfRun("billow = '=1/2'\n", 2, " --billow '=1/(2 - 2)'").starts_with("--billow:1:1: error"));
+  // In a frame of a sequence, too.
+  std::ofstream(path) << "billow = '=1/(1 - 1)'\n";
+  const ProgramResult frames = runProgram("cloud " + ownData("data/sphere_uv.obj") + " --resolution 24 -o " +
+                                          folder.file("a.##.vdb") + " --frames 1-2 --config " + path);
+  EXPECT_NE(frames.errors.find(path + ":1:12: error: division by zero"), std::string::npos) << frames.errors;
 }
 
 }  // namespace
