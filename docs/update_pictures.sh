@@ -84,7 +84,7 @@ if picture looks_day; then
   for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion wisps; do
     verb=cloud
     [ $look != wisps ] || verb=wisps
-    grow "look_$look.vdb" $verb --look "$look" --resolution 224
+    grow "look_$look.vdb" $verb --look "$look"
     for sun in "100,12 1" "140,62 0" "85,3 2.5"; do
       exposure=${sun#* }
       # Their own sky is as bright at any time, and so is fire.
@@ -101,7 +101,7 @@ if picture looks; then
   for look in humilis congestus towering storm overcast sunset silver-lining smoke explosion wisps; do
     verb=cloud
     [ $look != wisps ] || verb=wisps
-    grow "look_$look.vdb" $verb --look "$look" --resolution 224
+    grow "look_$look.vdb" $verb --look "$look"
     show "look_$look" "look_$look.vdb" --look "$look" --size 480x270
     [ $look = wisps ] || files="$files look_$look.png"
     # The viewer shows them, too.
@@ -239,7 +239,7 @@ if [ -n "${DISNEY:-}" ] && picture detail_4k; then
     view="--view 25,0 --sun 100,35"
     [ "$name" != cumulus_detail.felt ] || view="$view --set mesh=\"$base\""
     show "whole_$name" "$volume" $view --size 480x270
-    show "crop_$name" "$volume" $view --size 3840x2160 --crop 1100,620,1580,890
+    show "crop_$name" "$volume" $view --size 3840x2160 --crop 940,740,1420,1010
     files="$files whole_$name.png" crops="$crops crop_$name.png"
   done
   padding=:pad=4 tiles detail_4k.jpg 4x2 $files $crops
