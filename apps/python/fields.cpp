@@ -304,7 +304,7 @@ class FunctionOfPython final : public FieldNode<T> {
         (std::size_t(got.ndim()) != wanted.size() || !std::equal(wanted.begin(), wanted.end(), got.shape())))
       throw py::value_error("a field's function must return one value for each of its points: got " +
                             shapeText(got) + " for " + std::to_string(points.count) + " points");
-    const auto flat = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(got);
+    const auto flat = Packed<float>::ensure(got);
     for (int i = 0; i < points.count; ++i)
       for (int c = 0; c < kLanes; ++c) values[c][i] = flat.data()[isScalar ? 0 : i * kLanes + c];
   }
@@ -367,16 +367,22 @@ std::string shapeText(const py::array& array) {
   return "an array of shape " + std::string(py::str(array.attr("shape")));
 }
 
-py::array_t<float> floatsFrom(const py::handle& object, const std::string& what) {
+py::array numbersFrom(const py::handle& object, const std::string& what, Numbers which) {
+  const std::string needed =
+      what + (which == Numbers::real ? ": real" : ": whole") + " numbers are needed, got ";
   const py::array array = py::array::ensure(object);
   if (!array) {
     PyErr_Clear();
-    throw py::type_error(what + ": numbers are needed, got " + std::string(py::str(py::type::of(object))));
+    throw py::type_error(needed + std::string(py::str(py::type::of(object))));
   }
-  const char kind = array.dtype().kind();
-  if (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b')
-    throw py::type_error(what + ": real numbers are needed, got an array of " +
-                         std::string(py::str(array.dtype())));
+  const std::string_view kinds = which == Numbers::real ? "fiub" : "iu";
+  if (array.size() > 0 && kinds.find(array.dtype().kind()) == std::string_view::npos)
+    throw py::type_error(needed + "an array of " + std::string(py::str(array.dtype())));
+  return array;
+}
+
+py::array_t<float> floatsFrom(const py::handle& object, const std::string& what) {
+  const py::array array = numbersFrom(object, what);
   if (py::isinstance<py::array_t<float>>(array)) return py::reinterpret_borrow<py::array_t<float>>(array);
   return py::array_t<float, py::array::forcecast>::ensure(array);
 }

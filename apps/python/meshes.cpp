@@ -12,35 +12,15 @@ namespace nephele::python {
 namespace {
 
 using pybind11::literals::operator""_a;
-using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
-using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-Indices indicesFrom(const py::object& object, const char* what) {
-  const py::array array = py::array::ensure(object);
-  if (!array) {
-    PyErr_Clear();
-    throw py::type_error(std::string(what) + ": whole numbers are needed");
-  }
-  const char kind = array.dtype().kind();
-  if (array.size() > 0 && kind != 'i' && kind != 'u')
-    throw py::type_error(std::string(what) + ": whole numbers are needed, got an array of " +
-                         std::string(py::str(array.dtype())));
-  return Indices::ensure(array);
+Packed<std::int64_t> facesFrom(const py::handle& object) {
+  return packedFrom<std::int64_t>(object, "F", Numbers::whole);
 }
 
 void setPositions(Mesh& mesh, const py::object& object) {
-  const py::array given = py::array::ensure(object);
-  if (!given) {
-    PyErr_Clear();
-    throw py::type_error("V: numbers are needed, one row of 3 for each vertex");
-  }
-  const char kind = given.dtype().kind();
-  if (kind != 'f' && kind != 'i' && kind != 'u')
-    throw py::type_error("V: real numbers are needed, got an array of " +
-                         std::string(py::str(given.dtype())));
-  if (given.ndim() != 2 || given.shape(1) != 3)
-    throw py::value_error("V: rows of 3 numbers are needed, got " + shapeText(given));
-  const Numbers numbers = Numbers::ensure(given);
+  const Packed<double> numbers = packedFrom<double>(object, "V");
+  if (numbers.ndim() != 2 || numbers.shape(1) != 3)
+    throw py::value_error("V: rows of 3 numbers are needed, got " + shapeText(numbers));
   const double* from = numbers.data();
   for (py::ssize_t i = 0; i < numbers.shape(0); ++i, from += 3) {
     mesh.positions.emplace_back(from[0], from[1], from[2]);
@@ -67,13 +47,13 @@ void setFaces(Mesh& mesh, const py::object& object) {
     for (std::size_t f = 1; f < faces.size() && isEven; ++f) isEven = py::len(faces[f]) == py::len(faces[0]);
     if (!isEven) {
       for (std::size_t f = 0; f < faces.size(); ++f) {
-        const Indices face = indicesFrom(faces[f], "F");
+        const Packed<std::int64_t> face = facesFrom(faces[f]);
         addCorners(mesh, face.data(), std::size_t(face.size()), f);
       }
       return;
     }
   }
-  const Indices faces = indicesFrom(object, "F");
+  const Packed<std::int64_t> faces = facesFrom(object);
   if (faces.size() == 0) return;
   if (faces.ndim() != 2) throw py::value_error("F: one row for each face is needed, got " + shapeText(faces));
   const auto width = std::size_t(faces.shape(1));
@@ -83,8 +63,7 @@ void setFaces(Mesh& mesh, const py::object& object) {
 
 /// (n,) and (n, w) belong to vertices, (faces, corners, w) and a list of corners (c, w) to corners.
 void addAttribute(Mesh& mesh, const std::string& name, const py::object& object) {
-  const auto values = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(
-      floatsFrom(object, "attribute '" + name + "'"));
+  const Packed<float> values = packedFrom<float>(object, "attribute '" + name + "'");
   MeshAttribute attribute{.name = name,
                           .values = std::vector<float>(values.data(), values.data() + values.size())};
   const auto rows = std::size_t(values.ndim() > 0 ? values.shape(0) : 0);

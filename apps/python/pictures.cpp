@@ -70,8 +70,7 @@ py::array screenOf(const Self& self, const std::string& view, double exposure,
 }
 
 Self makePicture(const py::object& object, const std::optional<py::dict>& layers) {
-  const auto array =
-      py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(floatsFrom(object, "picture"));
+  const Packed<float> array = packedFrom<float>(object, "picture");
   if (array.ndim() != 3 || array.shape(2) < 3 || array.shape(2) > 4 || array.size() == 0)
     throw py::value_error("picture: (height, width, 3 or 4) is needed, got " + shapeText(array));
   auto content = std::make_shared<ExrContent>();
@@ -89,8 +88,7 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
   if (count == 3) add("A", true, &one, 0);
   if (layers)
     for (const auto& [key, value] : *layers) {
-      const auto layer =
-          py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(floatsFrom(value, "layer"));
+      const Packed<float> layer = packedFrom<float>(value, "layer");
       if (layer.ndim() < 2 || layer.ndim() > 3 || layer.shape(0) != image.height ||
           layer.shape(1) != image.width)
         throw py::value_error("layer '" + std::string(py::str(key)) + "': got " + shapeText(layer) +

@@ -63,10 +63,21 @@ class PythonGrid {
   std::optional<VoxelBox> box_;
 };
 
+enum class Numbers { real, whole };
+/// The array that `object` is or can be read as. @throws py::type_error naming `what` unless it holds such
+/// numbers; an empty one holds any.
+py::array numbersFrom(const py::handle& object, const std::string& what, Numbers which = Numbers::real);
 /// The numbers of `object` as floats: the array itself where it holds such, whatever its strides, else a
-/// copy.
-/// @throws py::type_error naming `what` for anything that is no array of real numbers.
+/// copy. @throws py::type_error as numbersFrom.
 py::array_t<float> floatsFrom(const py::handle& object, const std::string& what);
+/// An array that lies in one piece, in C's order.
+template <class T>
+using Packed = py::array_t<T, py::array::c_style | py::array::forcecast>;
+/// The same, a copy only where it must be. @throws py::type_error as numbersFrom.
+template <class T>
+Packed<T> packedFrom(const py::handle& object, const std::string& what, Numbers which = Numbers::real) {
+  return Packed<T>::ensure(numbersFrom(object, what, which));
+}
 /// "an array of shape (4, 3)"
 std::string shapeText(const py::array& array);
 

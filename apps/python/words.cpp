@@ -106,8 +106,7 @@ Typed Conversion::operator()(const py::handle& object, const std::string& what) 
     const auto array = py::reinterpret_borrow<py::array>(object);
     if (array.ndim() == 0) return (*this)(array.attr("item")(), what);
     if (array.ndim() == 2 && array.shape(0) == 3 && array.shape(1) == 3) {
-      const auto numbers =
-          py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(floatsFrom(array, what));
+      const Packed<float> numbers = packedFrom<float>(array, what);
       Mat3f matrix;
       std::copy_n(numbers.data(), 9, matrix.m.begin());
       return {{Kind::matrix}, matrix};
@@ -303,7 +302,7 @@ Vec3d vectorFrom(const py::handle& object, const std::string& what) {
   if (!PySequence_Check(object.ptr()) && !py::isinstance<py::array>(object))
     throw py::type_error(what + ": three numbers are needed, got a " +
                          std::string(py::str(py::type::of(object).attr("__name__"))));
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+  const auto array = Packed<double>::ensure(object);
   if (!array) {
     PyErr_Clear();
     throw py::type_error(what + ": three numbers are needed");
