@@ -52,8 +52,7 @@ ExpressionNames namesOfShape(const ShapeLookUps& lookUps) {
   r.group("the shape");
   r.add("scalarfield along(vector direction, bool clamped = true)",
         "0 where the shape begins in this direction, 1 where it ends, and so beyond, unless it is not "
-        "clamped and goes on "
-        "in proportion.",
+        "clamped and goes on in proportion.",
         "ramp(along((1,0,0)), [0, 1], [1%, 3%])",
         [along = lookUps.along](const Vec3d& direction, bool clamped) {
           const ScalarField way = along(unit(direction));

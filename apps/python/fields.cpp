@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 
 #include <cstring>
+#include <string_view>
 
 #include "apps/python/values.h"
 #include "apps/python/watch.h"

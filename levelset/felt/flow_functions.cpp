@@ -47,8 +47,8 @@ void addFlowFunctions(Registry& r) {
   r.group("flows");
   r.add("vectorfield tdivfree(vectorfield velocity, domain region, string walls = \"periodic\")",
         "The velocity without its divergent part, sampled at the corners of the cells of `region`, where "
-        "central "
-        "differences over a cell find no divergence then. What leaves through a face enters through the one "
+        "central differences over a cell find no divergence then. What leaves through a face enters through "
+        "the one "
         "opposite, and outside of `region` the flow is the same again; with walls = \"closed\" nothing flows "
         "through the faces, and outside the flow is that of the nearest point of a wall.",
         "domain region = domain((-1,-1,-1), (2,2,2), (0,0,0), 0.1, 0.1, 0.1);\n"

@@ -114,8 +114,7 @@ void render(Context& context, const PictureFile& file, const S& density, const B
 void addRenderFunctions(Registry& r) {
   const std::string what =
       "Makes a picture of a density, .exr or .png, as the verb `render` does, in a sky of one radiance. It "
-      "is "
-      "sampled as finely as the camera sees it. `camera` is where the camera stands, `fov` its horizontal "
+      "is sampled as finely as the camera sees it. `camera` is where the camera stands, `fov` its horizontal "
       "angle of view in degrees; `extinction` is per world unit, 0 stands for one that suits; `color` "
       "multiplies the albedo, 0 to 1; `emission` glows; `sun` has azimuth, elevation and irradiance.";
   const std::string others =

@@ -118,8 +118,7 @@ void addReading(Registry& r) {
 void addWriting(Registry& r) {
   r.add("void write(string path, shape s)",
         "Writes a shape as .obj, .ply or .stl. Files appear whole or not at all, and never in place of one "
-        "that "
-        "the script has read.",
+        "that the script has read.",
         "write(\"ball.ply\", ls2shape(sphere((0,0,0), 1), 16));",
         [](Context& context, const std::string& path, const ShapePtr& s) {
           requireWritable(context, path, {".obj", ".ply", ".stl"});

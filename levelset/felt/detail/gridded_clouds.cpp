@@ -67,8 +67,8 @@ void addGriddedCloudFunctions(Registry& r) {
   r.add(
       "vectorfield nacelle(scalarfield object, scalarfield reference, domain box, int iterations = 3)",
       "The warp field between two shapes, as `nacelle` without a domain, of second order: what the "
-      "iterations "
-      "need of the reference's curvature is sampled on the domain once instead of evaluated each time.",
+      "iterations need of the reference's curvature is sampled on the domain once instead of evaluated each "
+      "time.",
       "vectorfield map = nacelle(sphere((0,0,0), 1.3), sphere((0,0,0), 1), domain((-2,-2,-2), (4,4,4), "
       "0.1));",
       [](Context& context, const S& object, const S& reference, const Domain& box, std::int64_t iterations) {

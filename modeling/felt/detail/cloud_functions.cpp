@@ -56,16 +56,15 @@ void addCloudFunctions(Registry& r) {
         });
   r.add("scalarfield cumulo(scalarfield base, scalarfield[] displacements, int iterations = 5)",
         "`base` with layers of displacement, each read at the surface of the sum before it. Nothing is "
-        "sampled, so "
-        "that every layer costs many times the one before: sample the sum into a cache for more than two.",
+        "sampled, so that every layer costs many times the one before: sample the sum into a cache for more "
+        "than two.",
         "scalarfield cloud = cumulo(sphere((0,0,0), 1), [0.1 * perlin(4), 0.05 * perlin(9)]);",
         [](const S& base, const Array& displacements, std::int64_t iterations) {
           return layered(base, displacements, iterations);
         });
   r.add("vectorfield nacelle(scalarfield object, scalarfield reference, int iterations = 3)",
         "The warp field between two shapes: object(x) = reference(nacelle(x)). Guarded where the formula of "
-        "the "
-        "notes divides by zero.",
+        "the notes divides by zero.",
         "vectorfield map = nacelle(sphere((0,0,0), 1.3), sphere((0,0,0), 1));",
         [](const S& object, const S& reference, std::int64_t iterations) {
           NacelleOptions options;
@@ -80,20 +79,19 @@ void addCloudFunctions(Registry& r) {
         "`f` carried along for a step: a velocity by itself, or a map of space.",
         "vectorfield map = advect(identity(), curlnoise(), 0.1);",
         [](const V& f, const V& velocity, double dt) { return advect(f, velocity, oneStep(dt)); });
-  r.add("scalarfield maccormack(scalarfield f, vectorfield velocity, float dt)",
-        "`advect` with errors of second order: half of what a step there and back again loses is given back, "
-        "as "
-        "far as values stay between those about the place that `advect` reads. Costs eleven times as much.",
-        "scalarfield moved = maccormack(mask(sphere((0,0,0), 1), 0.2), (1,0,0), 0.5);",
-        [](const S& f, const V& velocity, double dt) { return macCormack(f, velocity, finite("dt", dt)); });
+  r.add(
+      "scalarfield maccormack(scalarfield f, vectorfield velocity, float dt)",
+      "`advect` with errors of second order: half of what a step there and back again loses is given back, "
+      "as far as values stay between those about the place that `advect` reads. Costs eleven times as much.",
+      "scalarfield moved = maccormack(mask(sphere((0,0,0), 1), 0.2), (1,0,0), 0.5);",
+      [](const S& f, const V& velocity, double dt) { return macCormack(f, velocity, finite("dt", dt)); });
   r.add("vectorfield maccormack(vectorfield f, vectorfield velocity, float dt)",
         "`advect` with errors of second order.",
         "vectorfield map = maccormack(identity(), curlnoise(), 0.1);",
         [](const V& f, const V& velocity, double dt) { return macCormack(f, velocity, finite("dt", dt)); });
   r.add("vectorfield reflected(vectorfield velocity, scalarfield object, float retained = 1)",
         "The velocity turned back where it flows into an object: with `retained` 1 it is thrown back, with 0 "
-        "it "
-        "sticks, and only what runs along the surface is left.",
+        "it sticks, and only what runs along the surface is left.",
         "vectorfield flow = reflected((1,0,0), sphere((0,0,0), 1), 0.2);",
         [](const V& velocity, const S& object, double retained) {
           if (!(retained >= 0 && retained <= 1))

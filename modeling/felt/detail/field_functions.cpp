@@ -34,8 +34,7 @@ void addOfAll(Registry& r, const std::string& type) {
         [](const T& f, double factor) { return scale(f, finite("factor", factor)); });
   r.add(type + " memo(" + type + " f)",
         "The same field, evaluated once per block of points however often it occurs. Variables that are read "
-        "more "
-        "than once are remembered without being told.",
+        "more than once are remembered without being told.",
         "", [](const T& f) { return memo(f); });
 }
 

@@ -57,8 +57,7 @@ void addNoiseFunctions(Registry& r) {
         });
   r.add(
       "scalarfield fractalsum(int octaves = 4, float frequency = 1, float lacunarity = 2, float roughness = "
-      "0.5, int "
-      "seed = 0, string kind = \"perlin\")",
+      "0.5, int seed = 0, string kind = \"perlin\")",
       "Sum of noises, each `lacunarity` times as fine and `roughness` times as high as the one before, of "
       "rms 1.",
       "scalarfield rough = fractalsum(octaves = 5, frequency = 2);",
@@ -69,8 +68,7 @@ void addNoiseFunctions(Registry& r) {
       });
   r.add(
       "scalarfield fractalsum(scalarfield noise, int octaves = 4, float frequency = 1, float lacunarity = 2, "
-      "float "
-      "roughness = 0.5, int seed = 0)",
+      "float roughness = 0.5, int seed = 0)",
       "The same of any noise of frequency 1.",
       "scalarfield rough = fractalsum(noise(\"simplex\"), octaves = 3);",
       [](const ScalarField& noise, std::int64_t octaves, double frequency, double lacunarity,

@@ -37,8 +37,7 @@ void addSolids(Registry& r) {
         });
   r.add("scalarfield torus(vector center, vector axis, float radius, float tube)",
         "Distance to a ring, positive inside: from its centre to the middle of the tube it is `radius`, the "
-        "tube is "
-        "`tube` thick to each side.",
+        "tube is `tube` thick to each side.",
         "scalarfield ring = torus((0,0,0), (0,1,0), 1, 0.25);",
         [](const Vec3d& center, const Vec3d& axis, double radius, double tube) {
           return torus({finite("center", center), finite("axis", axis), finite("radius", radius),
@@ -89,8 +88,7 @@ void addCombinations(Registry& r) {
         [](const S& l, const S& distance) { return dilate(l, distance); });
   r.add(
       "scalarfield roughplane(vector point, vector normal, float amplitude, float frequency, int octaves = "
-      "4, float "
-      "roughness = 0.5, int seed = 0)",
+      "4, float roughness = 0.5, int seed = 0)",
       "A plane with hills of that rms, as a knife that breaks.",
       "scalarfield knife = roughplane((0,0,0), (0,1,0), 0.05, 3);",
       [](const Vec3d& point, const Vec3d& normal, double amplitude, double frequency, std::int64_t octaves,
