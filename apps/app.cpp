@@ -22,6 +22,7 @@
 #include "apps/wedge.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/nearest_name.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/felt/diagnostic.h"
 
@@ -233,6 +234,7 @@ std::vector<MadeCall> shownOf(const Line& line, std::vector<MadeCall> made) {
 
 void carryOut(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramRun& run) {
   check(command, line, run);
+  const CancelScope scope(&run);
   if (!line.isSeveral()) return command.bound.body(run);
   const CommonOptions& options = command.options;
   line.calls.skipExisting = options.skipExisting;

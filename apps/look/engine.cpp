@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/felt/diagnostic.h"
 
 namespace nephele::apps {
@@ -20,6 +21,10 @@ nlohmann::json jsonOf(const Vec3d& v) {
 
 /// What a drag may take for its picture, seconds.
 constexpr double kDragSeconds = 0.035, kSoonSeconds = 0.12;
+
+bool isOfShapes(const LookPlan& plan) {
+  return plan.what == LookShow::What::pieces || plan.what == LookShow::What::transfer;
+}
 
 /// What a page learns of a picture, whatever it was asked for.
 nlohmann::json describedPicture(const LookPicture& picture) {
@@ -94,6 +99,10 @@ class LookEngine::Work : public Run {
   void result(const std::string&) const override {}
 
   double seconds() const { return secondsSince(start_); }
+  /// From then until this work began: what older work took to end.
+  double waited(Clock::time_point asked) const {
+    return std::chrono::duration<double>(start_ - asked).count();
+  }
 
   /// Somebody else's first picture goes before this work.
   bool mayYield = false;
@@ -155,6 +164,7 @@ void LookEngine::tell(const std::string& page, const nlohmann::json& message) {
 }
 
 void LookEngine::ask(LookRequest request) {
+  request.asked = Clock::now();
   {
     const std::lock_guard lock(mutex_);
     const auto found = pages_.find(request.page);
@@ -242,8 +252,7 @@ void LookEngine::sendFault(const std::string& page, std::int64_t revision, const
 }
 
 LookPicture LookEngine::picture(LookTier& tier, const LookPlan& plan, const LookFrame& frame, Run& run) {
-  const std::string verb = LookShow::verb(plan.what);
-  if (verb == "cut" || verb == "transfer") return shapes_.picture(plan, frame, run);
+  if (isOfShapes(plan)) return shapes_.picture(plan, frame, run);
   return tier.picture(plan, frame, &tier == &fine_ ? nullptr : &fine_, run);
 }
 
@@ -264,6 +273,7 @@ void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const Loo
                   {"turns", request.show.what == LookShow::What::transfer},
                   {"milliseconds", 1000 * secondsSince(start)},
                   {"seconds", work.seconds()},
+                  {"waited", work.waited(request.asked)},
                   {"stage", isFinal                          ? "final"
                             : tier == LookPlan::Tier::coarse ? "coarse"
                                                              : "fine"}});
@@ -277,23 +287,25 @@ void LookEngine::show(const LookRequest& request, LookPlan::Tier tier, const Loo
 void LookEngine::make(const LookRequest& request) {
   using Tier = LookPlan::Tier;
   Work work(*this, request.page, request.revision);
+  const CancelScope scope(&work);
   const auto sized = [&](double share, int samples) {
     return LookFrame{std::max(int(std::lround(request.width * share)), 16),
                      std::max(int(std::lround(request.height * share)), 9), samples, request.show};
   };
   try {
     const double pixels = double(request.width) * request.height;
-    const bool isCloud = request.show.isVolume();
-    const bool isLit = isCloud && fine_.isLit(*request.plan);
-    const Tier first = isLit ? Tier::fine : Tier::coarse;
-    const LookTier& own = isLit ? fine_ : coarse_;
-    const int samples = request.plan->picture.render.samples;
-    const bool isSoon = isLit && !request.hurries && own.expectedSeconds(pixels * samples) < kSoonSeconds;
+    const LookPlan& plan = *request.plan;
+    const bool isVolume = request.show.isVolume(), isReady = !isOfShapes(plan) && fine_.isReady(plan);
+    const Tier first = isReady ? Tier::fine : Tier::coarse;
+    const LookPace& pace = isOfShapes(plan) ? shapes_.pace() : (isReady ? fine_ : coarse_).pace(isVolume);
+    const int samples = plan.picture.render.samples;
+    const bool isSoon =
+        isReady && isVolume && !request.hurries && pace.expectedSeconds(pixels * samples) < kSoonSeconds;
     if (!isSoon && !request.hasGivenWay) {
       // In steps, so that what needs no march is not marched at another size.
       constexpr double kSteps = 8;
-      const double fits = std::sqrt(kDragSeconds / own.expectedSeconds(pixels));
-      const double share = isCloud ? std::clamp(std::floor(fits * kSteps) / kSteps, 0.25, 1.0) : 0.5;
+      const double fits = std::sqrt(kDragSeconds / pace.expectedSeconds(pixels));
+      const double share = std::clamp(std::floor(fits * kSteps) / kSteps, 0.25, 1.0);
       show(request, first, sized(share, 1), 0, false, work);
     }
     if (request.hurries) return;
@@ -315,6 +327,7 @@ void LookEngine::make(const LookRequest& request) {
 
 void LookEngine::make(LookWedge& wedge) {
   Work work(*this, wedge.page, wedge.revision);
+  const CancelScope scope(&work);
   work.mayYield = true;
   for (std::size_t& i = wedge.next; i < wedge.cells.size(); ++i) {
     nlohmann::json message = {{"type", "wedge"},

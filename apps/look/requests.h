@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -22,6 +23,8 @@ struct LookRequest {
   LookShow show{};
   /// Gave way to another page's first picture, and does not again to one that did so, too.
   bool hasGivenWay = false;
+  /// When the engine learned of it.
+  std::chrono::steady_clock::time_point asked{};
 };
 
 /// Many small pictures of what differs in a setting or two.

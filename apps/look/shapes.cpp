@@ -75,11 +75,11 @@ LookPicture LookShapes::piecesPicture(const LookPlan& plan, const LookFrame& fra
     });
     if (pieces->pieces.empty()) throw LookFault("cut", "no piece is left: all are smaller than --min-volume");
     run.begin("pieces");
-    return std::make_shared<const LookSurfaces>(piecesObjects(*pieces, explode));
+    return std::make_shared<const LookSurfaces>(piecesObjects(*pieces, explode), run);
   });
   PictureOptions options = optionsOfSurfaces(plan, frame);
   standAt(options, {cut.picture.azimuthDegrees, cut.picture.elevationDegrees, 0});
-  return pictureOf(*shown, options, frame, run);
+  return pictureOf(*shown, options, frame, pace_, run);
 }
 
 std::shared_ptr<const LookShapes::Carried> LookShapes::carried(const LookPlan& plan, bool isQuick,
@@ -144,9 +144,10 @@ LookPicture LookShapes::transferPicture(const LookPlan& plan, const LookFrame& f
     run.begin("shapes");
     return std::make_shared<const LookSurfaces>(
         transfer.paintsDistortion ? distortionObjects(made->reference, made->object, made->quality, row)
-                                  : transferObjects(made->reference, made->object, texture, nullptr, row));
+                                  : transferObjects(made->reference, made->object, texture, nullptr, row),
+        run);
   });
-  return pictureOf(*shown, options, frame, run);
+  return pictureOf(*shown, options, frame, pace_, run);
 }
 
 }  // namespace nephele::apps

@@ -13,6 +13,7 @@ class LookShapes {
  public:
   /// Makes what is not there, and the picture. @throws Error; Cancelled.
   LookPicture picture(const LookPlan& plan, const LookFrame& frame, Run& run);
+  const LookPace& pace() const { return pace_; }
 
  private:
   /// An object with the texture coordinates of a reference, and how well they fit.
@@ -30,6 +31,7 @@ class LookShapes {
   // As they are set, and as they are made in a moment.
   Stage<Carried> carried_, quick_;
   Stage<LookSurfaces> surfaces_;
+  LookPace pace_{4e-7};
 };
 
 }  // namespace nephele::apps

@@ -91,6 +91,15 @@ PictureStages::Keys LookTier::keysOf(const LookPlan& plan) const {
   return keys;
 }
 
+std::string LookTier::surfaceKey(const LookPlan& plan) const {
+  const PictureStages::Keys keys = plan.keys(tier_);
+  return keys.shape + (plan.what == LookShow::What::checker ? "checker" : keys.levels + keys.volume);
+}
+
+bool LookTier::isReady(const LookPlan& plan) const {
+  return LookShow{plan.what}.isVolume() ? stages_.isLit(keysOf(plan)) : surface_.isAt(surfaceKey(plan));
+}
+
 LookTier::Growing::Growing(const CloudArguments& itsArguments, std::shared_ptr<const Mesh> itsMesh,
                            LookPlan::Tier tier, const Run& run)
     : arguments(itsArguments),
@@ -186,9 +195,7 @@ std::shared_ptr<const Mesh> LookTier::surface(const LookPlan& plan, LookTier* fi
 LookPicture LookTier::surfacePicture(const LookPlan& plan, const LookFrame& frame, LookTier* finer,
                                      Run& run) {
   const bool isChecker = plan.what == LookShow::What::checker;
-  const PictureStages::Keys keys = plan.keys(tier_);
-  const std::string key = keys.shape + (isChecker ? "checker" : keys.levels + keys.volume);
-  const auto shown = surface_.at(key, [&] {
+  const auto shown = surface_.at(surfaceKey(plan), [&] {
     const std::shared_ptr<const Mesh> mesh = surface(plan, finer, run);
     if (mesh->faceCount() == 0) throw LookFault("", "there is no surface to be seen");
     const bool hasUv =
@@ -196,9 +203,9 @@ LookPicture LookTier::surfacePicture(const LookPlan& plan, const LookFrame& fram
     if (isChecker && !hasUv) throw LookFault("", "the mesh has no texture coordinates");
     std::vector<SurfaceObject> objects;
     objects.push_back({.mesh = *mesh, .colour = kShapeColour, .checkers = isChecker ? 16 : 0});
-    return std::make_shared<const LookSurfaces>(std::move(objects));
+    return std::make_shared<const LookSurfaces>(std::move(objects), run);
   });
-  return pictureOf(*shown, optionsOfSurfaces(plan, frame), frame, run);
+  return pictureOf(*shown, optionsOfSurfaces(plan, frame), frame, shading_, run);
 }
 
 LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run) {
@@ -219,7 +226,7 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
     samplesKey_ = plan.keys(tier_).volume + kSamples;
   if (!frame.show.isVolume()) return surfacePicture(plan, frame, finer, run);
   std::shared_ptr<const LitCloud> lit;
-  if (isLit(plan)) {
+  if (isReady(plan)) {
     lit = stages_.lit();
     picture = picture.resolved(*lit->volume, run, &lit->light);
     plan.scene.addTo(picture, *lit->volume, true, run);
@@ -243,15 +250,12 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
                                                          frame.samples, frame.show.layer);
   const auto result =
       stages_.picture(key, camera, frame.samples > 0 ? picture.render : picture.marched(camera), run);
-  const double seconds = secondsSince(start);
-  if (seconds > kSecondsPerPicture)
-    secondsPerRay_ = 0.5 * (secondsPerRay_ + (seconds - kSecondsPerPicture) / rays);
+  march_.learn(rays, secondsSince(start));
   auto image = std::make_shared<Image>(result->image);
   picture.addSky(*image, camera, picture.lights);
   return {image,        camera,
           picture,      lit->volume->worldBounds(),
-          result->rays, double(lit->volume->density().voxelSize()),
-          seconds};
+          result->rays, double(lit->volume->density().voxelSize())};
 }
 
 }  // namespace nephele::apps

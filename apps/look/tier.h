@@ -15,16 +15,17 @@ class LookTier {
  public:
   explicit LookTier(LookPlan::Tier tier) : tier_(tier) {}
 
-  /// Whether a picture only needs to be marched.
-  bool isLit(const LookPlan& plan) const { return stages_.isLit(keysOf(plan)); }
+  /// Whether a picture only needs to be marched, or its surface to be shaded.
+  bool isReady(const LookPlan& plan) const;
   /// Makes what is not there, and the picture. `finer`, if there is one, lends its volume where that is what
   /// is read from a file. @throws Error; Cancelled.
   LookPicture picture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run);
-  /// Seconds that so many rays will take, from those before.
-  double expectedSeconds(double rays) const { return kSecondsPerPicture + rays * secondsPerRay_; }
+  /// Of pictures of volumes, or of surfaces.
+  const LookPace& pace(bool isVolume) const { return isVolume ? march_ : shading_; }
 
  private:
   PictureStages::Keys keysOf(const LookPlan& plan) const;
+  std::string surfaceKey(const LookPlan& plan) const;
   /// A cloud on its way from the shape to the density.
   struct Growing {
     CloudArguments arguments;
@@ -49,9 +50,6 @@ class LookTier {
   std::shared_ptr<const Mesh> surface(const LookPlan& plan, LookTier* finer, Run& run);
   LookPicture surfacePicture(const LookPlan& plan, const LookFrame& frame, LookTier* finer, Run& run);
 
-  /// What a march takes however few its rays are; measured.
-  static constexpr double kSecondsPerPicture = 0.01;
-
   LookPlan::Tier tier_;
   PictureStages stages_;
   Stage<LookSurfaces> surface_;
@@ -65,7 +63,7 @@ class LookTier {
   bool isGrown_ = false;
   // How far layers reach, by the keys of shape, layers and volume.
   std::map<std::string, std::string> reaches_;
-  double secondsPerRay_ = 1.5e-6;
+  LookPace march_{1.5e-6}, shading_{4e-7};
 };
 
 }  // namespace nephele::apps

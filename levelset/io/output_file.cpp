@@ -21,6 +21,7 @@
 
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 
 namespace nephele {
 namespace {
@@ -186,6 +187,7 @@ void OutputStream::requireWritten() const {
 }
 
 void OutputStream::write(std::string_view bytes) {
+  CancelScope::check();
   requireWritten();
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
   error_ = errno;
@@ -204,6 +206,7 @@ void OutputStream::seek(std::uint64_t position) {
 }
 
 void OutputStream::close() {
+  CancelScope::check();
   const bool failed = error_ != 0 || std::ferror(file_) != 0 || std::fflush(file_) != 0;
   if (failed && error_ == 0) error_ = errno != 0 ? errno : EIO;
   if (std::fclose(std::exchange(file_, nullptr)) != 0 && error_ == 0) error_ = errno;

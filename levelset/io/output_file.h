@@ -61,12 +61,12 @@ class OutputStream {
   /// For those who write through C's library; they need not look for errors.
   std::FILE* file() const { return file_; }
 
-  /// @throws Error naming the path and the reason.
+  /// @throws Error naming the path and the reason; Cancelled, see CancelScope.
   void write(std::string_view bytes);
   std::uint64_t position();
   void seek(std::uint64_t position);
 
-  /// @throws Error naming the path and the reason if anything was not written.
+  /// @throws Error naming the path and the reason if anything was not written; Cancelled, see CancelScope.
   void close();
 
   /// Throws what `close` would, where writing has failed already.

@@ -9,6 +9,23 @@
 #include <atomic>
 
 namespace nephele {
+namespace {
+
+thread_local const Progress* innermost = nullptr;
+
+}  // namespace
+
+CancelScope::CancelScope(const Progress* progress) : around_(innermost) {
+  innermost = progress;
+}
+
+CancelScope::~CancelScope() {
+  innermost = around_;
+}
+
+void CancelScope::check() {
+  if (innermost) innermost->check();
+}
 
 void parallelFor(std::size_t count, std::size_t grain,
                  const std::function<void(std::size_t, std::size_t)>& body, const Progress& progress) {
@@ -16,11 +33,15 @@ void parallelFor(std::size_t count, std::size_t grain,
   const std::size_t pieceSize = grain > 0 ? grain : 1;
   const std::size_t pieces = (count + pieceSize - 1) / pieceSize;
   std::atomic<std::size_t> finished{0};
+  const Progress* const around = innermost;
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, pieces, 1),
       [&](const tbb::blocked_range<std::size_t>& range) {
+        // The threads that help, too; and a thread that waits may help with somebody else's loop.
+        const CancelScope scope(around);
         for (std::size_t piece = range.begin(); piece != range.end(); ++piece) {
           progress.check();
+          CancelScope::check();
           const std::size_t begin = piece * pieceSize;
           body(begin, begin + pieceSize < count ? begin + pieceSize : count);
           progress.advance(double(finished.fetch_add(1) + 1) / double(pieces));

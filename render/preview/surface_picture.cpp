@@ -202,7 +202,7 @@ float likeness(const Seen& own, const Seen& other, int step) {
 }
 
 /// Smooths what is seen of lamp and sky between pixels that are like each other.
-void smooth(std::vector<Seen>& pixels, int width, int height) {
+void smooth(std::vector<Seen>& pixels, int width, int height, const Progress& progress) {
   constexpr float kShares[5] = {1.0f / 16, 1.0f / 4, 3.0f / 8, 1.0f / 4, 1.0f / 16};
   struct Light {
     float lamp;
@@ -210,30 +210,33 @@ void smooth(std::vector<Seen>& pixels, int width, int height) {
   };
   std::vector<Light> smoothed(pixels.size());
   for (int step = 1; step <= kSkySteps; step *= 2) {
-    parallelFor(std::size_t(height), 4, [&](std::size_t begin, std::size_t end) {
-      for (int y = int(begin); y != int(end); ++y)
-        for (int x = 0; x != width; ++x) {
-          const auto at = std::size_t(y) * std::size_t(width) + std::size_t(x);
-          const Seen& own = pixels[at];
-          smoothed[at] = {own.lamp, own.sky};
-          if (!(own.size > 0)) continue;
-          float all = 0;
-          Light sum{0, {}};
-          for (int j = -2; j <= 2; ++j)
-            for (int i = -2; i <= 2; ++i) {
-              const int u = x + i * step, v = y + j * step;
-              if (u < 0 || v < 0 || u >= width || v >= height) continue;
-              const Seen& other = pixels[std::size_t(v) * std::size_t(width) + std::size_t(u)];
-              if (!(other.size > 0)) continue;
-              const float share = kShares[i + 2] * kShares[j + 2] * likeness(own, other, step);
-              all += share;
-              sum.lamp += share * other.lamp;
-              sum.sky += other.sky * share;
+    parallelFor(
+        std::size_t(height), 4,
+        [&](std::size_t begin, std::size_t end) {
+          for (int y = int(begin); y != int(end); ++y)
+            for (int x = 0; x != width; ++x) {
+              const auto at = std::size_t(y) * std::size_t(width) + std::size_t(x);
+              const Seen& own = pixels[at];
+              smoothed[at] = {own.lamp, own.sky};
+              if (!(own.size > 0)) continue;
+              float all = 0;
+              Light sum{0, {}};
+              for (int j = -2; j <= 2; ++j)
+                for (int i = -2; i <= 2; ++i) {
+                  const int u = x + i * step, v = y + j * step;
+                  if (u < 0 || v < 0 || u >= width || v >= height) continue;
+                  const Seen& other = pixels[std::size_t(v) * std::size_t(width) + std::size_t(u)];
+                  if (!(other.size > 0)) continue;
+                  const float share = kShares[i + 2] * kShares[j + 2] * likeness(own, other, step);
+                  all += share;
+                  sum.lamp += share * other.lamp;
+                  sum.sky += other.sky * share;
+                }
+              if (step <= kLampSteps) smoothed[at].lamp = sum.lamp / all;
+              smoothed[at].sky = sum.sky * (1 / all);
             }
-          if (step <= kLampSteps) smoothed[at].lamp = sum.lamp / all;
-          smoothed[at].sky = sum.sky * (1 / all);
-        }
-    });
+        },
+        progress);
     for (std::size_t i = 0; i != pixels.size(); ++i) {
       pixels[i].lamp = smoothed[i].lamp;
       pixels[i].sky = smoothed[i].sky;
@@ -294,7 +297,7 @@ Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int sample
                 scene.look(std::size_t(window.x0) + x, std::size_t(window.y0) + y, samples);
       },
       progress);
-  smooth(pixels, window.width(), window.height());
+  smooth(pixels, window.width(), window.height(), SubProgress(progress, 1, 1));
   Image image;
   image.width = window.width();
   image.height = window.height();

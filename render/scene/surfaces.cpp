@@ -107,13 +107,15 @@ struct Surfaces::Scene {
   }
 };
 
-Surfaces::Surfaces(std::vector<SurfaceObject> objects)
+Surfaces::Surfaces(std::vector<SurfaceObject> objects, const Progress& progress)
     : scene_(std::make_unique<Scene>()), objects_(std::move(objects)) {
   for (std::size_t i = 0; i != objects_.size(); ++i) {
     SurfaceObject& object = objects_[i];
+    progress.check();
     object.mesh = triangulated(object.mesh);
     const std::string name = fmt::format("object {}", i + 1);
     require(object.mesh.faceCount() > 0, name + ": the mesh has no faces");
+    progress.check();
     const Box box = boundingBox(object.mesh);
     for (const Vec3d& p : object.mesh.positions)
       require(isFinite(p), name + ": the mesh has positions that are not finite");
@@ -145,6 +147,9 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects)
   rtcSetSceneFlags(scene.shading, RTC_SCENE_FLAG_ROBUST);
   for (std::size_t i = 0; i != objects_.size(); ++i) {
     const SurfaceObject& object = objects_[i];
+    progress.check();
+    scene.normals.push_back(vertexNormals(object.mesh));
+    progress.check();
     const RTCGeometry geometry = rtcNewGeometry(scene.device, RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), object.mesh.positions.size()));
@@ -157,7 +162,6 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects)
     }
     for (std::size_t p = 0; p != object.mesh.positions.size(); ++p)
       positions[p] = Vec3f(object.mesh.positions[p] - scene.centre);
-    scene.normals.push_back(vertexNormals(object.mesh));
     std::copy(object.mesh.corners.begin(), object.mesh.corners.end(), corners);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene.seen, geometry, unsigned(i));
@@ -167,8 +171,15 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects)
     }
     rtcReleaseGeometry(geometry);
   }
-  rtcCommitScene(scene.seen);
-  rtcCommitScene(scene.shading);
+  for (const RTCScene built : {scene.seen, scene.shading}) {
+    rtcSetSceneProgressMonitorFunction(
+        built, [](void* p, double) { return !static_cast<const Progress*>(p)->cancelled(); },
+        const_cast<Progress*>(&progress));
+    progress.check();
+    rtcCommitScene(built);
+    progress.check();
+    rtcSetSceneProgressMonitorFunction(built, nullptr, nullptr);
+  }
 }
 
 Surfaces::~Surfaces() = default;

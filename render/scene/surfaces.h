@@ -7,6 +7,7 @@
 
 #include "nephele/modeling/base/box.h"
 #include "nephele/modeling/base/mesh.h"
+#include "nephele/modeling/base/progress.h"
 #include "nephele/render/image/image.h"
 #include "nephele/render/scene/camera.h"
 
@@ -34,8 +35,8 @@ struct SurfaceObject {
 class Surfaces {
  public:
   /// Cost: n log n in the number of triangles. @throws Error naming the object's number and what is wrong: no
-  /// faces, positions that are not finite, a checker or texture without texture coordinates.
-  explicit Surfaces(std::vector<SurfaceObject> objects);
+  /// faces, positions that are not finite, a checker or texture without texture coordinates; Cancelled.
+  explicit Surfaces(std::vector<SurfaceObject> objects, const Progress& progress = silent());
   ~Surfaces();
   Surfaces(const Surfaces&) = delete;
   Surfaces& operator=(const Surfaces&) = delete;

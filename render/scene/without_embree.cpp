@@ -14,7 +14,7 @@ namespace {
 
 struct Surfaces::Scene {};
 
-Surfaces::Surfaces(std::vector<SurfaceObject>) {
+Surfaces::Surfaces(std::vector<SurfaceObject>, const Progress&) {
   refuse();
 }
 

@@ -5,7 +5,7 @@ Usage: look.py PROGRAM INPUT [OPTIONS of look ...]
 """
 import http.client
 import json
-import resource
+import random
 import statistics
 import struct
 import subprocess
@@ -98,6 +98,41 @@ class Viewer:
         return time.time() - at
 
 
+def dragged(viewer, what, settings):
+    """How long pictures of surfaces take while their view is dragged."""
+    how = {"size": (1280, 720), "show": {"what": what}}
+    viewer.final(settings, **how)
+    views = [viewer.picture({**settings, "render": {"view": f"{25 + 3 * i},5"}}, hurry=True, **how) for i in range(15)]
+    size = [f"{m['width']}x{m['height']}" for m in viewer.messages if m.get("type") == "picture"][-1]
+    print(f"{what + ' dragged':16}         {1000 * statistics.median(views):7.1f} ms in the median, "
+          f"{len(views) / sum(views):.1f} a second, {size}")
+
+
+def cancelling(viewer):
+    """How long work takes to give up, of every kind and at random moments of it, for what is newer."""
+    moments = random.Random(1)
+    kinds = {"cloud": (20, lambda i: {"settings": {"cloud": {"amplitude": f"{3 + i / 100}%"}}}),
+             "shape": (6, lambda i: {"settings": {"cloud": {"subdivide": str(i % 2), "amplitude": f"{5 + i / 100}%"}}}),
+             "sun": (8, lambda i: {"settings": {"render": {"sun": [f"{30 + 7 * i},30"]}}}),
+             "camera": (8, lambda i: {"settings": {"render": {"view": f"{10 + 7 * i},5"}}, "size": (1920, 1080)}),
+             "surface": (6, lambda i: {"settings": {"cloud": {"amplitude": f"{4 + i / 100}%"}}, "size": (1280, 720),
+                                        "show": {"what": "surface"}}),
+             "pieces": (8, lambda i: {"settings": {"cut": {"voronoi": f"{20 + i}"}}, "show": {"what": "pieces"}})}
+    every = []
+    for name, (count, change) in kinds.items():
+        viewer.final(**change(0))
+        whole, waits = viewer.final(**change(1)), []
+        for i in range(2, count + 2):
+            viewer.ask(**change(i))
+            time.sleep(moments.uniform(0, whole))
+            newer, _ = viewer.ask({"render": {"exposure": str(i / 10)}}, hurry=True)
+            waits.append(1000 * viewer.wait("picture", newer)["waited"])
+        every += waits
+        print(f"ended for newer, {name:8}{statistics.median(waits):7.1f} ms in the median, {max(waits):.1f} at most, "
+              f"of {count}")
+    print(f"ended for newer, all     {statistics.median(every):7.1f} ms in the median, {max(every):.1f} at most, of {len(every)}")
+
+
 def main():
     program, arguments = sys.argv[1], sys.argv[2:]
     viewer = Viewer(program, arguments)
@@ -128,6 +163,9 @@ def main():
         print(f"amplitude, at rest       {1000 * viewer.final({'cloud': {'amplitude': '3%'}}):7.1f} ms")
         print(f"billow, at rest          {1000 * viewer.final({'cloud': {'amplitude': '3%', 'billow': '0.7'}}):7.1f} ms")
         print(f"edge, at rest            {1000 * viewer.final({'cloud': {'amplitude': '3%', 'edge-thickness': '0.5%'}}):7.1f} ms")
+        for what in ("surface", "checker", "pieces"):
+            dragged(viewer, what, {"cut": {"random-planes": "6"}} if what == "pieces" else {})
+        cancelling(viewer)
     before = viewer.processor()
     time.sleep(3)
     print(f"idle                     {(viewer.processor() - before) / 3:7.3f} of a core")

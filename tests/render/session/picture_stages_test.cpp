@@ -4,11 +4,14 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <time.h>
 
 #include <atomic>
+#include <mutex>
 
 #include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "tests/support/density.h"
 
 namespace nephele {
@@ -37,7 +40,7 @@ struct Steps {
   std::string edge = "0.05";
   Lights lights = kLights;
   std::string lightsKey = "sun";
-  float azimuth = 20;
+  float azimuth = 20, voxelSize = 1.0f / 24;
 
   std::shared_ptr<const RenderResult> picture(const Progress& progress = silent()) {
     stages.shape("humilis", [&] {
@@ -45,6 +48,7 @@ struct Steps {
       return cloudShapeMesh({});
     });
     CloudOptions options = cloudOptions(amplitude);
+    options.voxelSize = voxelSize;
     options.edgeThickness = ScalarField(std::stof(edge));
     const auto levels = stages.levels(std::to_string(amplitude), options, {}, progress);
     const auto volume = stages.volume(edge, [&] {
@@ -159,6 +163,44 @@ TEST(PictureStages, GoOnAfterTheyWereCancelled) {
   EXPECT_GT(cancels, 1);
   expectSame(steps.picture()->image, whole->image);
   EXPECT_EQ(steps.shapes, 1);
+}
+
+/// The longest time of a processor that a thread has worked without a look whether it should stop.
+class Looks : public Progress {
+ public:
+  bool cancelled() const override {
+    thread_local const Looks* of = nullptr;
+    thread_local double last = 0;
+    const double now = processorSeconds(CLOCK_THREAD_CPUTIME_ID);
+    const std::lock_guard lock(mutex_);
+    if (of == this && now - last > longest_) longest_ = now - last;
+    of = this;
+    last = now;
+    return false;
+  }
+  static double processorSeconds(clockid_t clock) {
+    timespec time;
+    clock_gettime(clock, &time);
+    return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
+  }
+  double longest() const { return longest_; }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable double longest_ = 0;
+};
+
+// As a share of the whole, so that it does not depend on the machine.
+TEST(PictureStages, LookOftenWhetherTheyShouldStop) {
+  Steps steps;
+  steps.voxelSize = 1.0f / 128;
+  const Looks looks;
+  const CancelScope scope(&looks);
+  const double start = Looks::processorSeconds(CLOCK_PROCESS_CPUTIME_ID);
+  steps.picture(looks);
+  const double whole = Looks::processorSeconds(CLOCK_PROCESS_CPUTIME_ID) - start;
+  RecordProperty("longest_share", std::to_string(looks.longest() / whole));
+  EXPECT_LT(looks.longest(), 0.1 * whole) << whole << " s in all";
 }
 
 // What the stages come to does not depend on what they have kept, and of layers they keep the first ones.
