@@ -33,9 +33,14 @@ class Legendre {
   int degree_ = 0;
 };
 
+// Share of the light that goes straight on: of a phase function that scatters backward hardly any, since no
+// moment of what is left may be below -1.
 float fAbove(const std::vector<float>& moments, int degree) {
   const std::size_t next = std::size_t(degree) + 1;
-  return next < moments.size() ? std::clamp(moments[next], 0.0f, 0.999f) : 0.0f;
+  if (next >= moments.size()) return 0.0f;
+  float most = 0.999f;
+  for (std::size_t l = 1; l < next; ++l) most = std::min(most, (1 + moments[l]) / 2);
+  return std::clamp(moments[next], 0.0f, std::max(most, 0.0f));
 }
 
 // How far moment l goes on with the beam.

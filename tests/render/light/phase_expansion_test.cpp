@@ -70,6 +70,17 @@ TEST(SmoothScattering, TakesThePeakAway) {
   EXPECT_EQ(SmoothScattering(legendreMoments(Phase::henyeyGreenstein(g)), 1, 3).albedo, 1);
 }
 
+TEST(SmoothScattering, LeavesAPhaseFunctionWhateverItIsOf) {
+  // Every mean of a Legendre polynomial is within -1 and 1, and solutions grow without end where one is not.
+  for (const char* form : {"hg:-0.99", "hg:-0.6", "hg:0.99", "rayleigh", "two-lobe:0.99,-0.9,0.5", "mie:50"})
+    for (int degree = 1; degree <= 5; ++degree) {
+      const SmoothScattering smooth(legendreMoments(Phase::parse(form)), 1, degree);
+      EXPECT_GT(smooth.share, 0) << form;
+      for (const float moment : smooth.moments)
+        EXPECT_LE(std::abs(moment), 1 + 1e-5f) << form << ", " << degree;
+    }
+}
+
 TEST(ForwardLight, IsThePhaseFunctionItselfAtTheSurface) {
   for (const char* form : {"hg:0.85", "hg:0.3", "mie:20", "rayleigh", "two-lobe:0.9,-0.2,0.4"}) {
     const Phase phase = Phase::parse(form);
