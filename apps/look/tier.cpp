@@ -165,6 +165,7 @@ std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookT
     return stages_.volume(key, [&] { return ran.withVoxels(voxels_, run); });
   }
   if (plan.growsCloud()) {
+    if (auto kept = stages_.volumeAt(keysOf(plan))) return kept;
     const std::unique_ptr<Growing> growing = grown(plan, run);
     return stages_.volume(key, [&] {
       RenderVolume made = growing->volume(plan, run);

@@ -12,6 +12,11 @@ std::string joined(const std::string& before, const std::string& own) {
   return before + kBetween + own;
 }
 
+std::string volumeKey(const PictureStages::Keys& keys) {
+  const std::string levels = keys.levels.empty() ? std::string() : joined(keys.shape, keys.levels);
+  return joined(levels, keys.volume);
+}
+
 }  // namespace
 
 std::shared_ptr<const Mesh> PictureStages::shape(const std::string& key, const std::function<Mesh()>& read) {
@@ -87,8 +92,11 @@ std::shared_ptr<const RenderResult> PictureStages::picture(const std::string& ke
 }
 
 bool PictureStages::isLit(const Keys& keys) const {
-  const std::string levels = keys.levels.empty() ? std::string() : joined(keys.shape, keys.levels);
-  return light_.isAt(joined(joined(joined(levels, keys.volume), keys.medium), keys.lights));
+  return light_.isAt(joined(joined(volumeKey(keys), keys.medium), keys.lights));
+}
+
+std::shared_ptr<const RenderVolume> PictureStages::volumeAt(const Keys& keys) const {
+  return volume_.isAt(volumeKey(keys)) ? volume_.kept() : nullptr;
 }
 
 void PictureStages::forgetLight() {

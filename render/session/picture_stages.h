@@ -69,6 +69,8 @@ class PictureStages {
   };
   /// Whether the light is there under these keys; a picture then only needs to be marched.
   bool isLit(const Keys& keys) const;
+  /// The volume, where it is there under these keys; else null.
+  std::shared_ptr<const RenderVolume> volumeAt(const Keys& keys) const;
   /// How many layers the levels took from those before.
   std::size_t layersTaken() const { return layers_.taken(); }
   /// The light that is there, whatever it is of, or null.

@@ -136,6 +136,8 @@ TEST(PictureStages, KnowWhetherThereIsLight) {
   EXPECT_FALSE(steps.stages.isLit(keys));
   steps.picture();
   EXPECT_TRUE(steps.stages.isLit(keys));
+  EXPECT_EQ(steps.stages.volumeAt(keys), steps.stages.lit()->volume);
+  EXPECT_EQ(steps.stages.volumeAt({"humilis", keys.levels, "0.2", "medium", "sun"}), nullptr);
   EXPECT_FALSE(steps.stages.isLit({"humilis", keys.levels, keys.volume, "medium", "moved"}));
   EXPECT_FALSE(steps.stages.isLit({"congestus", keys.levels, keys.volume, "medium", "sun"}));
   steps.stages.forget();
