@@ -49,6 +49,8 @@ class Viewer:
             return
 
     def post(self, name, body):
+        # The server ends connections that rest, which they do while a picture is waited for.
+        self.poster.close()
         self.poster.request("POST", self.address.path + name, json.dumps(body), {"Content-Type": "application/json"})
         response = self.poster.getresponse()
         return response.status, json.loads(response.read())
