@@ -187,7 +187,8 @@ TEST_F(CloudRecipe, ThatIsNotThereIsNamed) {
 TEST_F(CloudRecipe, ASpectrumForAnotherNoiseIsNamedWithThePlace) {
   const ProgramResult spectrum = run("[[layer]]\nspectrum = { lowest = 1 }\n", "");
   EXPECT_EQ(spectrum.exitCode, 2);
-  EXPECT_NE(spectrum.errors.find("recipe.toml:2:12: error: only noise = \"fft\" has a spectrum"), std::string::npos)
+  EXPECT_NE(spectrum.errors.find("recipe.toml:2:12: error: only noise = \"fft\" has a spectrum"),
+            std::string::npos)
       << spectrum.errors;
 }
 
