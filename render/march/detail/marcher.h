@@ -76,16 +76,14 @@ class Marcher {
     return opacity[0] + opacity[1] + opacity[2] > 3 * detail::kVisibleOpacity;
   }
 
-  // The result so far, with the light that is waited for: what is added to it later stays as without a
-  // record.
+  // The result so far, with the light that is waited for; what is added later stays as without a record.
   void mark();
 
   // The steps of a block, before its light is added.
   void record(float before, const float* after, int used);
 
-  // What steps weigh in the picture, by their own optical depths and those behind them: the transmittance
-  // that each takes away, and nothing where the ray is as good as opaque. Adds what glows in them.
-  // `first` is which step of the block the first of them is.
+  // What steps, from the `first` of the block on, weigh in the picture: the transmittance that each takes
+  // away, and nothing where the ray is as good as opaque. Adds what glows in them.
   HWY_INLINE void weigh(int first, Floats own, Floats after, Floats seen, LitPart<kColours>& steps);
 
   // T (1 - exp(-t)) / t, by its series where the difference would lose its digits.
@@ -97,8 +95,7 @@ class Marcher {
   // Of all that wait for it.
   void lightAll();
 
-  // Finds where the light of steps is. It is read when the next densities have been found: the processor does
-  // not look far enough ahead to read one while it looks for the other.
+  // Finds where the light of steps is. It is read when the next densities have been found: one wait for both.
   void light(const LitPart<kColours>& steps);
 
   // Adds the light that located steps send to the eye.
