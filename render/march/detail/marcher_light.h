@@ -1,4 +1,4 @@
-// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+// How a Marcher adds light. No #pragma once: read for every instruction set, by <hwy/foreach_target.h>.
 #if defined(NEPHELE_MARCHER_LIGHT) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHELE_MARCHER_LIGHT
 #undef NEPHELE_MARCHER_LIGHT
@@ -13,7 +13,6 @@
 
 #include "nephele/render/march/detail/marcher.h"
 
-/// How a Marcher adds the light of steps.
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 

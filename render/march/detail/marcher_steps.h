@@ -1,4 +1,4 @@
-// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+// How a Marcher collects steps. No #pragma once: read for every instruction set, by <hwy/foreach_target.h>.
 #if defined(NEPHELE_MARCHER_STEPS) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHELE_MARCHER_STEPS
 #undef NEPHELE_MARCHER_STEPS
@@ -13,7 +13,6 @@
 
 #include "nephele/render/march/detail/marcher.h"
 
-/// How a Marcher collects steps and adds their opacity.
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
@@ -54,11 +53,10 @@ inline bool Marcher<kColours>::take(const MarchStep& step) {
   ds_[count_] = step.length;
   known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
   someKnown_ = true;
-  if constexpr (kColours == 3)
-    for (int c = 0; c != 3; ++c) {
-      colours_[c][count_] = step.colour[c];
-      glows_[c][count_] = step.glow[c];
-    }
+  for (int c = 0; c != kColours; ++c) {
+    colours_[c][count_] = step.colour[c];
+    glows_[c][count_] = step.glow[c];
+  }
   return ++count_ != kBlock || (flush() && !isHidden_);
 }
 
@@ -70,7 +68,6 @@ inline bool Marcher<kColours>::flush() {
   if (used != end) repeatLast();
   count_ = 0;
   result_.samples += unsigned(used);
-
   // Optical depths of the steps, and behind them.
   alignas(64) float own[kBlock], after[kBlock];
   Places places[kBlock / kLanes];

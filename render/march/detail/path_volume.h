@@ -70,9 +70,8 @@ class PathVolume {
     return {std::clamp(range.min, 0.0f, mostDensity_), std::clamp(range.max, 0.0f, mostDensity_)};
   }
 
-  // A tentative collision is real by a chance that lies between those of the colours, by their weights, and
-  // each weight makes up for it (spectral tracking, Kutz, Habel, Li and Novak 2017). `real`: how likely it is
-  // to each of them.
+  // A tentative collision is real by a chance between those of the colours, `real`, and their weights make up
+  // for it (spectral tracking, Kutz, Habel, Li and Novak 2017).
   static bool isReal(Flight& flight, const Vec3f& real, double distance);
   // Adds what glows at a tentative collision, over the bound that it was drawn for.
   void addGlow(Flight& flight, const Vec3f& emission, float bound, double distance) const;
@@ -122,8 +121,7 @@ struct PathVolume::Scratch::Track {
   FieldDensity::Line line;
   GlowingWalk walk;
   PathRandom random;
-  // The part of the line that is being crossed, the extinction that collisions are drawn for there, where on
-  // it, and the optical depth to the next tentative collision.
+  // The part of the line being crossed, the bound there, where on it, and the depth to the next collision.
   GlowingWalk::Span span{};
   float bound = 0.0f;
   bool hasSpan = false;
