@@ -49,10 +49,14 @@ using detail::LayerPart;
 using detail::LayerParts;
 using detail::Packing;
 
-/// Samples per wave of the finest noise: of layers that others build on, of the last one, and the least.
+/// Samples per wave of the finest noise: the most of layers that others build on, and of the last one, and
+/// the fewest.
 constexpr float kSamplesPerWave = 16;
 constexpr float kSamplesPerLastWave = 12;
 constexpr float kFewestSamplesPerWave = 6;
+/// Where the result has fewer voxels to the last wave, so have the layers before it, which are still off by
+/// less.
+constexpr float kMoreSamples = 1.5f;
 /// Jumps are smoothed over at least this many voxels of a layer's grid to either side: fewer leave edges too
 /// steep.
 constexpr int kLeastDilation = 2;
@@ -359,8 +363,11 @@ class LayerSampler {
 
 float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index, float resultVoxelSize) {
   const float wave = 1 / (layers[index].frequency * layers[index].detail);
-  const float aimed = wave / (index + 1 < layers.size() ? kSamplesPerWave : kSamplesPerLastWave);
-  return std::min(wave / kFewestSamplesPerWave, std::max(aimed, resultVoxelSize));
+  const float ofLast =
+      std::clamp(1 / (layers.back().frequency * resultVoxelSize), kFewestSamplesPerWave, kSamplesPerLastWave);
+  const float aimed =
+      index + 1 < layers.size() ? std::min(kMoreSamples * ofLast, kSamplesPerWave) : kSamplesPerLastWave;
+  return std::min(wave / kFewestSamplesPerWave, std::max(wave / aimed, resultVoxelSize));
 }
 
 float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge, bool areKept) {
