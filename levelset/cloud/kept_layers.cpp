@@ -14,10 +14,6 @@ namespace {
 // No key contains it, so that keys side by side cannot be mistaken for others.
 constexpr char kBetween = '\n';
 
-bool isVarying(const CumuloLayer& layer) {
-  return !layer.amplitude.range(Box::everywhere()).isPoint();
-}
-
 }  // namespace
 
 float KeptLayers::reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize) {
@@ -29,6 +25,13 @@ float KeptLayers::reach(const std::vector<CumuloLayer>& layers, std::size_t inde
     reach = bound + step * std::ceil(reach / step);
   }
   return reach;
+}
+
+bool KeptLayers::areLaterAsked(std::span<const CumuloLayer> layers) {
+  return std::ranges::any_of(layers, [](const CumuloLayer& layer) {
+    const Interval amplitude = layer.amplitude.range(Box::everywhere());
+    return !amplitude.isPoint() && amplitude.min <= 0;
+  });
 }
 
 ScalarField KeptLayers::distance(const std::string& numbers, const std::function<ScalarField()>& make) {
@@ -47,8 +50,7 @@ ScalarField KeptLayers::distance(const std::string& numbers, const std::function
 std::string KeptLayers::keyOf(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
                               const std::string& numbers) const {
   std::string key = keys_.layers.at(step.index) + kBetween + numbers;
-  // A bake leaves out what all layers that follow are too low for.
-  if (std::any_of(layers.begin() + std::ptrdiff_t(step.index), layers.end(), isVarying))
+  if (areLaterAsked(std::span(layers).subspan(step.index)))
     for (std::size_t i = step.index + 1; i < layers.size(); ++i) key += kBetween + keys_.layers.at(i);
   return key;
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,9 @@ class KeptLayers {
 
   /// How far layers reach here: `layers[index]` and those after it.
   static float reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize);
+  /// Whether the first of these layers is left out where those after it are low, and so depends on their
+  /// amplitudes: where one of them vanishes somewhere, since that saves much.
+  static bool areLaterAsked(std::span<const CumuloLayer> layers);
 
   /// The distance that is there under the key of the shape and these numbers, or what `make` returns. Where
   /// it is made, all layers are let go first.

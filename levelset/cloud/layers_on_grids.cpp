@@ -20,6 +20,7 @@
 #include <deque>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -152,7 +153,12 @@ class LayerSampler {
     const MedialSmoothingOptions smoothing{.jump = largestSlope(step) * voxel, .dilation = dilation(voxel)};
     const LayerParts cut = detail::partsOf(box, voxel, smoothing.dilation + smoothing.steps);
     const std::shared_ptr<PackedGrid> layer = detail::emptyPackedGrid(detail::noSamples(box, voxel, cut.all));
-    const ScalarField needed = detail::neededDisplacement(step, layers_, options_.voxelSize);
+    const std::span<const CumuloLayer> after = std::span(layers_).subspan(step.index);
+    const bool areLaterAsked = !options_.kept || KeptLayers::areLaterAsked(after);
+    const ScalarField needed =
+        areLaterAsked
+            ? detail::neededDisplacement(step, after, 0, options_.voxelSize)
+            : detail::neededDisplacement(step, after.first(1), step.reach - step.bound, options_.voxelSize);
     const int count = cut.count();
     std::deque<LayerPart> parts;
     const auto bakePart = [&](int part) {

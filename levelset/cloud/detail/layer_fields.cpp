@@ -51,15 +51,17 @@ class GrownNode final : public FieldNode<float> {
 
 class NeededNode final : public FieldNode<float> {
  public:
-  NeededNode(const CumuloStep& step, const std::vector<CumuloLayer>& layers, float voxelSize)
+  NeededNode(const CumuloStep& step, std::span<const CumuloLayer> asked, float further, float voxelSize)
       : displacement_(step.displacement.node()),
         level_(step.level.node()),
         reach_(step.reach),
         margin_(step.margin),
-        voxelSize_(voxelSize) {
-    for (std::size_t i = step.index; i < layers.size(); ++i) {
-      heights_.push_back({layers[i].amplitude.node(), layers[i].noise.range(Box::everywhere()).magnitude()});
-      leastReach_ += layers[i].amplitude.range(Box::everywhere()).min * heights_.back().noiseBound;
+        voxelSize_(voxelSize),
+        further_(further),
+        leastReach_(further) {
+    for (const CumuloLayer& layer : asked) {
+      heights_.push_back({layer.amplitude.node(), layer.noise.range(Box::everywhere()).magnitude()});
+      leastReach_ += layer.amplitude.range(Box::everywhere()).min * heights_.back().noiseBound;
     }
   }
 
@@ -78,7 +80,7 @@ class NeededNode final : public FieldNode<float> {
     const float depth = std::min(-level.min, reach_ + margin_);
     const Box near = box.expanded(farthestSurfacePoint(depth, voxelSize_));
     // Amplitudes in a box can take a search: the first often tell.
-    float reach = 0;
+    float reach = further_;
     for (const Height& height : heights_) {
       reach += memo.of(height.amplitude, near).max * height.noiseBound;
       if (reach >= missing) return range;
@@ -94,15 +96,13 @@ class NeededNode final : public FieldNode<float> {
 
   NodePtr<float> displacement_, level_;
   std::vector<Height> heights_;
-  float reach_, margin_, voxelSize_;
+  float reach_, margin_, voxelSize_, further_;
   /// What the layers add at least where their noise is largest.
-  float leastReach_ = 0;
+  float leastReach_;
 };
 
-bool isAmplitudeVarying(const CumuloStep& step, const std::vector<CumuloLayer>& layers) {
-  return std::any_of(layers.begin() + std::ptrdiff_t(step.index), layers.end(), [](const CumuloLayer& layer) {
-    return !layer.amplitude.range(Box::everywhere()).isPoint();
-  });
+bool isVarying(const CumuloLayer& layer) {
+  return !layer.amplitude.range(Box::everywhere()).isPoint();
 }
 
 }  // namespace
@@ -111,10 +111,10 @@ ScalarField grownLevel(const ScalarField& before, const ScalarField& level, cons
   return ScalarField(std::make_shared<GrownNode>(before, level, displacement));
 }
 
-ScalarField neededDisplacement(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
+ScalarField neededDisplacement(const CumuloStep& step, std::span<const CumuloLayer> asked, float further,
                                float voxelSize) {
-  if (!isAmplitudeVarying(step, layers)) return step.displacement;
-  return ScalarField(std::make_shared<NeededNode>(step, layers, voxelSize));
+  if (std::ranges::none_of(asked, isVarying)) return step.displacement;
+  return ScalarField(std::make_shared<NeededNode>(step, asked, further, voxelSize));
 }
 
 }  // namespace nephele::detail

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "nephele/modeling/cloud/cumulo.h"
 
@@ -13,9 +13,10 @@ ScalarField grownLevel(const ScalarField& before, const ScalarField& level, cons
 
 /// The displacement of a layer for a bake that leaves out what cannot matter: its range is 0 where amplitudes
 /// near by are too small for this layer and those after it to bring the sum to the surface. The displacement
-/// itself where amplitudes do not vary, as nothing can be left out then. `layers` must be those of the step,
-/// `voxelSize` that of the result.
-ScalarField neededDisplacement(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
+/// itself where amplitudes do not vary, as nothing can be left out then. `asked` are the layers whose
+/// amplitudes count, from that of the step on; those after them reach `further`. `voxelSize` is that of the
+/// result.
+ScalarField neededDisplacement(const CumuloStep& step, std::span<const CumuloLayer> asked, float further,
                                float voxelSize);
 
 }  // namespace nephele::detail

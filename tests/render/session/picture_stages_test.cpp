@@ -6,12 +6,16 @@
 #include <gtest/gtest.h>
 #include <time.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <mutex>
 
 #include "nephele/levelset/grid/voxel_grid.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/field/function_field.h"
+#include "nephele/modeling/field/operations.h"
 #include "tests/support/density.h"
 
 namespace nephele {
@@ -236,6 +240,36 @@ TEST(PictureStages, KeepLayersBeforeThatWhichChanges) {
   stages.forget();
   levels(stages, 0.031f, 0.009f, 0.54f);
   EXPECT_EQ(stages.layersTaken(), 0u);
+}
+
+// Amplitudes that vary keep them, too, as long as they vanish nowhere.
+TEST(PictureStages, KeepLayersWhoseAmplitudesVary) {
+  // From 0 to 1 along x, over the middle of the shape.
+  const ScalarField rising = functionField(
+      [](const Vec3f& p) { return std::clamp(2 * p.x + 0.5f, 0.0f, 1.0f); }, {.range = [](const Box& box) {
+        return Interval{std::clamp(2 * box.min.x + 0.5f, 0.0f, 1.0f),
+                        std::clamp(2 * box.max.x + 0.5f, 0.0f, 1.0f)};
+      }});
+  const auto taken = [&](float least) {
+    PictureStages stages;
+    const auto levels = [&](float last) {
+      stages.shape("humilis", [] { return cloudShapeMesh({}); });
+      CloudOptions options = cloudOptions(0.03f, 3, 0.55f);
+      for (std::size_t i = 0; i < 3; ++i)
+        options.layers[i].amplitude =
+            max(rising, least) * (i == 2 ? last : 0.03f * std::pow(0.55f, float(i)));
+      const std::string key = fmt::format("{}", last);
+      const auto result = stages.levels(key, options, {"", "", key});
+      PictureStages fresh;
+      fresh.shape("humilis", [] { return cloudShapeMesh({}); });
+      EXPECT_EQ(samplesOf(result->levels), samplesOf(fresh.levels(key, options, {"", "", key})->levels));
+    };
+    levels(0.0085f);
+    levels(0.009f);
+    return stages.layersTaken();
+  };
+  EXPECT_EQ(taken(0.3f), 2u);
+  EXPECT_EQ(taken(0.0f), 0u);
 }
 
 TEST(PictureStages, RefuseStepsWithoutTheOnesBefore) {
