@@ -108,14 +108,14 @@ LookTier::Growing::Growing(const CloudArguments& itsArguments, std::shared_ptr<c
       options(optionsOf(arguments, tier, sources, run)) {}
 
 RenderVolume LookTier::Growing::volume(const LookPlan& plan, Run& run) {
-  VoxelGrid<float> density = makeCloud(*levels, options, run).density;
   const CloudAdvectionArguments& advection = arguments.advection;
+  const auto density = [&] { return makeCloud(*levels, options, run).density; };
   std::shared_ptr<const BrickGrid> bricks;
   if (advection.isAny(sources)) {
     const VdbGridLabel label{"density", VdbGridInfo::Class::fogVolume, false};
-    bricks = toBricks(advection.carried(toVdb(std::move(density), label), sources, arguments.seed, run));
+    bricks = toBricks(advection.carried(toVdb(density(), label), sources, arguments.seed, run));
   } else {
-    bricks = toBricks(density);
+    bricks = toBricks(density());
   }
   return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
 }

@@ -61,6 +61,7 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
           fmt::format("KeptLayers: expected a key for each of {} layers, got {}", layers.size(),
                       keys_.layers.size()));
   wanted_ = keyOf(step, layers, numbers);
+  wantedIndex_ = step.index;
   if (step.index < layers_.size() && layerKeys_[step.index] == wanted_) {
     ++taken_;
     return &layers_[step.index];
@@ -71,6 +72,9 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
 }
 
 void KeptLayers::keep(Layer layer) {
+  std::size_t bytes = layer.bytes;
+  for (const Layer& before : layers_) bytes += before.bytes;
+  if (wantedIndex_ != layers_.size() || bytes > kMostBytes) return;
   layers_.push_back(std::move(layer));
   layerKeys_.push_back(std::move(wanted_));
 }

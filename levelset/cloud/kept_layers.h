@@ -20,10 +20,14 @@ class PackedGrid;
 /// What a cloud comes to does not depend on what was kept. But layers must reach as far as later ones bring
 /// the surface: here they reach farther, in steps of a quarter of their own height, so that a layer is not
 /// made again for a slightly higher one after it. A few voxels in a million are others than in a cloud
-/// without kept layers. The last layer is not kept, nor is anything of a cloud without keys. For one cloud at
-/// a time.
+/// without kept layers. The last layer is not kept, nor are fine ones that would make it all more than
+/// `kMostBytes`: they take the most memory, and changes before them are likelier. Nothing of a cloud without
+/// keys is kept. For one cloud at a time.
 class KeptLayers {
  public:
+  /// Of all layers together.
+  static constexpr std::size_t kMostBytes = std::size_t(128) << 20;
+
   /// What the next cloud depends on. Equal keys stand for equal layers.
   struct Keys {
     std::string shape;
@@ -52,12 +56,14 @@ class KeptLayers {
     CumuloSampled sampled;
     std::shared_ptr<PackedGrid> level{};
     CumuloLayerReport report{};
+    /// What it holds.
+    std::size_t bytes = 0;
   };
   /// The layer of a step that is there under its key, those of the layers before, and these numbers; or null.
   /// One of another key is let go, with all after it. @throws Error if there is no key for each layer.
   const Layer* find(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
                     const std::string& numbers);
-  /// Keeps the layer that was not found last.
+  /// Keeps the layer that was not found last, if there is room for it and those before it are there.
   void keep(Layer layer);
 
  private:
@@ -66,6 +72,7 @@ class KeptLayers {
 
   Keys keys_;
   std::string distanceKey_, wanted_;
+  std::size_t wantedIndex_ = 0;
   std::optional<ScalarField> distance_;
   std::vector<std::string> layerKeys_;
   std::vector<Layer> layers_;

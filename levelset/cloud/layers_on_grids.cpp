@@ -127,7 +127,9 @@ class LayerSampler {
     prepareNext(step, grid, sampled);
     reports.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     progress_.count("active_voxels", double(reports.back().activeVoxels));
-    if (isKept) options_.kept->keep({sampled, level_, reports.back()});
+    if (isKept)
+      options_.kept->keep(
+          {sampled, level_, reports.back(), grid->memoryBytes() + (level_ ? level_->memoryBytes() : 0)});
     return sampled;
   }
 

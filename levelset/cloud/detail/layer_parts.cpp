@@ -13,7 +13,7 @@ namespace {
 /// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
 /// copy less from their neighbours.
 constexpr int kPartBricks = 8;
-constexpr double kPartPositions = 1 << 18;
+constexpr double kPartPositions = 1 << 17;
 
 }  // namespace
 
