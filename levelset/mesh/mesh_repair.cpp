@@ -264,6 +264,20 @@ class Ladder {
     return share;
   }
 
+  /// Wrapping constructs points that are so far apart, and goes wrong without a word where they are not.
+  void requireDigits(double distance) const {
+    constexpr double kLeast = 1e-11;
+    const Box& box = result_.before.box;
+    double farthest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      farthest = std::max({farthest, std::abs(double(box.min[axis])), std::abs(double(box.max[axis]))});
+    require(distance >= kLeast * farthest,
+            fmt::format(
+                "mesh repair: the mesh is too far from the origin to be wrapped: its longest side is {:.3g}, "
+                "its coordinates are up to {:.3g}",
+                box.longestSide(), farthest));
+  }
+
   void wrap(const std::string& why) {
     for (const double share : {options_.wrapAlpha, options_.wrapOffset})
       require(share > 0 && share <= 1,
@@ -279,6 +293,7 @@ class Ladder {
     }
     const double fineAlpha = options_.wrapAlpha * coarser * side,
                  fineOffset = options_.wrapOffset * coarser * side;
+    requireDigits(std::min(fineAlpha, fineOffset));
     const Wrap wrap = chosenWrap(fineAlpha, fineOffset);
     const double alpha = wrap.factor * fineAlpha, offset = wrap.factor * fineOffset;
     const bool isSheet = isShell(wrap, fineOffset);

@@ -372,6 +372,20 @@ TEST(MeshRepair, NothingButDegenerateFacesIsRefused) {
   EXPECT_NE(messageFor(Mesh{}, Mode::automatic).find("no faces"), std::string::npos);
 }
 
+TEST(MeshRepair, RefusesToWrapWhatIsFartherFromTheOriginThanItsDigitsReach) {
+  Mesh far = test::icosphere(1, 1);
+  // Steps between numbers at 1e6 are a hundredth of the offset.
+  for (Vec3d& p : far.positions) p = p * 1e-6 + Vec3d{1e6, 0, 0};
+  try {
+    repairMesh(far, {.mode = Mode::wrap});
+    FAIL() << "was wrapped";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("too far from the origin"), std::string::npos) << error.what();
+  }
+  for (Vec3d& p : far.positions) p = (p - Vec3d{1e6, 0, 0}) * 1e6 + Vec3d{100, 0, 0};
+  EXPECT_GT(repairMesh(far, {.mode = Mode::wrap}).mesh.faceCount(), 0u);
+}
+
 TEST(MeshRepair, WrapOptionsOutOfRangeAreNamed) {
   EXPECT_THROW(repairMesh(cube(), {.mode = Mode::wrap, .wrapAlpha = 0}), Error);
   EXPECT_THROW(repairMesh(cube(), {.mode = Mode::wrap, .wrapOffset = -1}), Error);
