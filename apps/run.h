@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -12,10 +13,9 @@
 #include "apps/file_hashes.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/progress.h"
-#include "nephele/render/session/stage.h"
 
 namespace nephele {
-struct LitCloud;
+class PictureStages;
 }
 
 namespace nephele::apps {
@@ -74,8 +74,8 @@ class Run : public Progress {
 
   /// Of the files that are read.
   FileHashes files;
-  /// What the picture before was of, by lightKey: pictures that follow may look at it again.
-  Stage<LitCloud> lit;
+  /// The steps to the picture before, by pictureKeys, for those that follow; null before the first.
+  std::shared_ptr<PictureStages> pictureStages;
 };
 
 /// What is wrong with several things, one line each.

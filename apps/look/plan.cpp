@@ -6,7 +6,7 @@
 #include "apps/file_hashes.h"
 #include "apps/options/common_group.h"
 #include "apps/options/outputs.h"
-#include "apps/options/picture/light_key.h"
+#include "apps/options/picture/picture_keys.h"
 
 namespace nephele::apps {
 namespace {
@@ -22,21 +22,6 @@ const Names kOfDensity{"half",         "edge-thickness", "edge-variation", "dens
                        "wind"};
 // And those that the first layer does not depend on.
 const Names kOfLaterLayers{"lacunarity", "roughness", "billow", "billow-scale"};
-// Options of the verb render.
-const Names kOfLights{"sun", "point",         "spot",         "light-decay",   "shadow-multiplier",
-                      "sky", "ground-albedo", "sky-rotation", "sky-intensity", "sky-encoding"};
-const Names kOfMedium{"shadows",          "shadow-detail",
-                      "shadow-tolerance", "read-deep-shadow",
-                      "extinction",       "albedo",
-                      "extinction-color", "phase",
-                      "octaves",          "scale",
-                      "quality",          "light-quality",
-                      "object",           "holdout-object",
-                      "object-color",     "checker",
-                      "texture",          "texture-encoding",
-                      "ground",           "ground-height",
-                      "ground-color"};
-
 bool isIn(std::span<const std::string_view> names, const std::string& name) {
   return std::ranges::count(names, name) > 0;
 }
@@ -215,11 +200,11 @@ PictureStages::Keys LookPlan::keys(Tier tier) const {
   if (growsCloud())
     keys.volume += keyOf(ofCloud, [](const std::string& name) { return isIn(kOfDensity, name); });
   keys.volume += level + settings["parameters"].dump() + keyOf(ofRender, [](const std::string& name) {
-                   return !isIn(kOfLights, name) && !isIn(kOfMedium, name) && !isIn(screenOptions(), name) &&
-                          !isIn(cameraOptions(), name);
+                   return !isIn(lightOptions(), name) && !isIn(mediumOptions(), name) &&
+                          !isIn(screenOptions(), name) && !isIn(cameraOptions(), name);
                  });
-  keys.medium = keyOf(ofRender, [](const std::string& name) { return isIn(kOfMedium, name); });
-  keys.lights = keyOf(ofRender, [](const std::string& name) { return isIn(kOfLights, name); });
+  keys.medium = keyOf(ofRender, [](const std::string& name) { return isIn(mediumOptions(), name); });
+  keys.lights = keyOf(ofRender, [](const std::string& name) { return isIn(lightOptions(), name); });
   return keys;
 }
 

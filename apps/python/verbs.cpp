@@ -27,18 +27,18 @@ using pybind11::literals::operator""_a;
 /// What one call leaves to the next. For several threads: a call that finds it taken does without.
 class Kept {
  public:
-  Stage<LitCloud> take() {
+  std::shared_ptr<PictureStages> take() {
     const std::lock_guard lock(mutex_);
-    return std::exchange(lit_, {});
+    return std::exchange(stages_, {});
   }
-  void put(Stage<LitCloud> lit) {
+  void put(std::shared_ptr<PictureStages> stages) {
     const std::lock_guard lock(mutex_);
-    lit_ = std::move(lit);
+    stages_ = std::move(stages);
   }
 
  private:
   std::mutex mutex_;
-  Stage<LitCloud> lit_;
+  std::shared_ptr<PictureStages> stages_;
 };
 
 /// A run that prints nothing: what it has to say goes to a Watch.
@@ -50,10 +50,10 @@ class WatchedRun final : public apps::ProgramRun {
         kept_(kept),
         isVerbose_(options.verbose),
         isQuiet_(options.quiet) {
-    if (kept_) lit = kept_->take();
+    if (kept_) pictureStages = kept_->take();
   }
   ~WatchedRun() override {
-    if (kept_) kept_->put(std::move(lit));
+    if (kept_) kept_->put(std::move(pictureStages));
   }
 
   void begin(std::string_view stage) const override {

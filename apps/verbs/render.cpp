@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
-#include "apps/options/picture/light_key.h"
 #include "apps/options/picture/live_picture.h"
 #include "apps/options/picture/picture_files.h"
+#include "apps/options/picture/picture_keys.h"
 #include "apps/options/picture/render_options.h"
 #include "apps/options/picture/scene_options.h"
 #include "apps/options/picture/shapes_picture.h"
@@ -31,16 +31,14 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
   options.app = &app;
 }
 
-/// Marches or path traces. Light that is made stays with the run under `key`.
-RenderResult pictureOf(const PictureOptions& picture, const std::shared_ptr<const RenderVolume>& volume,
-                       const Camera& camera, const std::string& key, Run& run) {
-  if (picture.pathTraced) return picture.picture(*volume, camera, run);
-  const bool isLit = run.lit.kept() != nullptr;
-  const auto& lit = run.lit.at(key, [&] {
-    return std::make_shared<const LitCloud>(
-        LitCloud{volume, LitVolume(*volume, picture.medium, picture.lights, picture.render.octaves, run,
-                                   picture.render.surfaces)});
-  });
+/// Marches or path traces `volume`, which is that of the stages. Light that is made stays with them.
+RenderResult pictureOf(const PictureOptions& picture, const RenderVolume& volume, const Camera& camera,
+                       const PictureStages::Keys& keys, PictureStages& stages, Run& run) {
+  if (picture.pathTraced) return picture.picture(volume, camera, run);
+  const bool isLit = stages.isLit(keys);
+  const auto lit =
+      stages.light(keys.medium, keys.lights,
+                   {picture.medium, picture.lights, picture.render.octaves, picture.render.surfaces}, run);
   RenderResult result = lit->light.render(camera, picture.marched(camera), run);
   if (!isLit) result.lightSeconds = lit->light.lightSeconds();
   return result;
@@ -54,13 +52,18 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
                               files, run);
-  const std::string key = lightKey(*options.app, scene, picture, run);
-  // Two volumes never stand side by side.
-  if (key.empty() || !run.lit.isAt(key)) run.lit.forget();
-  const LitVolume* light = run.lit.kept() ? &run.lit.kept()->light : nullptr;
-  const auto made = light ? nullptr : std::make_shared<RenderVolume>(scene.volume(picture, run));
-  const std::shared_ptr<const RenderVolume> volume = light ? run.lit.kept()->volume : made;
-  picture = picture.resolved(*volume, run, light);
+  const PictureStages::Keys keys = pictureKeys(*options.app, scene, picture, run);
+  if (!run.pictureStages) run.pictureStages = std::make_shared<PictureStages>();
+  PictureStages& stages = *run.pictureStages;
+  std::shared_ptr<const RenderVolume> volume = keys.volume.empty() ? nullptr : stages.volumeAt(keys);
+  std::shared_ptr<RenderVolume> made;
+  if (!volume) {
+    // Two volumes never stand side by side.
+    stages.forget();
+    volume = made = std::make_shared<RenderVolume>(scene.volume(picture, run));
+    stages.volume(keys.volume, volume);
+  }
+  picture = picture.resolved(*volume, run, stages.isLit(keys) ? &stages.lit()->light : nullptr);
   scene.addTo(picture, *volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();
   if (!scene.holdout.empty())
@@ -70,7 +73,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   picture.light.writeShadows(*volume, picture.lights, picture.medium, run);
   if (made && !picture.needsSamples()) made->giveUpSamples();
   LivePicture live(picture.displayServer, files.name(), picture.render);
-  RenderResult result = pictureOf(picture, volume, camera, key, run);
+  RenderResult result = pictureOf(picture, *volume, camera, keys, stages, run);
   picture.addSky(result.image, camera, picture.lights);
   run.begin("write");
   files.write(result, camera, picture.screen, picture.metadata(run));

@@ -308,13 +308,16 @@ class Sessions(Case):
     def test_make_the_pictures_of_single_calls_and_keep_the_light(self):
         fog = fog_grid()
         session = nephele.Session(fog)
-        lights = []
-        for change in ({}, {"view": (60, 20)}, {"exposure": 1}, {"sun": (10, 20, 3)}, {"sun": (10, 20, 3), "view": (60, 20)}):
+        lights, reads = [], []
+        for change in ({}, {"view": (60, 20)}, {"exposure": 1}, {"sun": (10, 20, 3)}, {"sun": (10, 20, 3), "view": (60, 20)}, {"extinction": 7}):
             wanted = nephele.render(fog, **dict(self.SMALL, **change))
             found, stats = session.render(**dict(self.SMALL, **change), stats=True)
             np.testing.assert_array_equal(found.array, wanted.array)
-            lights.append(any(stage["name"].startswith("light") or stage["name"] == "scatter" for stage in stats["stages"]))
-        self.assertEqual(lights, [True, False, False, True, False])
+            names = [stage["name"] for stage in stats["stages"]]
+            lights.append(any(name.startswith("light") or name == "scatter" for name in names))
+            reads.append("read" in names)
+        self.assertEqual(lights, [True, False, False, True, False, True])
+        self.assertEqual(reads, [True, False, False, False, False, False])
 
     def test_see_objects_as_they_were_and_name_them(self):
         fog = fog_grid()
