@@ -178,7 +178,7 @@ double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
   // Measured, bytes: the program itself; the mesh and what finds its closest points, per face; the distance
   // to it, per voxel of its area; and both while they are made. The result stores leaves of 8 voxels on an
   // edge that layers make larger.
-  constexpr double kProgram = 4.8e7, kFace = 160, kFaceWork = 330, kBase = 150, kBaseWork = 320, kLeaf = 8;
+  constexpr double kProgram = 4.8e7, kFace = 160, kFaceWork = 330, kBase = 90, kBaseWork = 320, kLeaf = 8;
   constexpr double kGrowth = 1.5, kCaution = 1.1;
   require(!options.layers.empty(), "estimatedCloudBytes: there must be at least one layer");
   const double area = surfaceArea(mesh), voxel = options.voxelSize;

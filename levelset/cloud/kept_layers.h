@@ -26,7 +26,7 @@ class PackedGrid;
 class KeptLayers {
  public:
   /// Of all layers together.
-  static constexpr std::size_t kMostBytes = std::size_t(128) << 20;
+  static constexpr std::size_t kMostBytes = std::size_t(64) << 20;
 
   /// What the next cloud depends on. Equal keys stand for equal layers.
   struct Keys {

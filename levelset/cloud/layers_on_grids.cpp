@@ -15,11 +15,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <deque>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -32,6 +32,7 @@
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_memo.h"
 #include "nephele/levelset/grid/brick_samples.h"
+#include "nephele/levelset/grid/detail/brick_borders.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
@@ -45,6 +46,8 @@ namespace {
 
 using detail::BrickSamples;
 using detail::BrickSlab;
+using detail::kLeastDilation;
+using detail::kMarginVoxels;
 using detail::kWholePositions;
 using detail::LayerPart;
 using detail::LayerParts;
@@ -58,11 +61,6 @@ constexpr float kFewestSamplesPerWave = 6;
 /// Where the result has fewer voxels to the last wave, so have the layers before it, which are still off by
 /// less.
 constexpr float kMoreSamples = 1.5f;
-/// Jumps are smoothed over at least this many voxels of a layer's grid to either side: fewer leave edges too
-/// steep.
-constexpr int kLeastDilation = 2;
-/// A layer's band is this many of its voxels wider on either side than where its displacement matters.
-constexpr float kMarginVoxels = 4;
 /// Largest slope of Perlin noise, in units of its bound times its frequency.
 constexpr float kLargestSlope = 3.2f;
 /// How far the sampled sum may be off at a crease, in voxels of its grid.
@@ -290,17 +288,19 @@ class LayerSampler {
   };
 
   /// Adds what the part of a layer inside `slab` comes to, and leaves out the bricks that do not matter:
-  /// keeps those whose sums are such that the layers after this one can bring them to the surface.
+  /// keeps those whose sums are such that the layers after this one can bring them to the surface, and those
+  /// that interpolation around such samples reads.
   std::vector<Packing> judged(const CumuloStep& step, const BrickSamples& part, const BrickSlab& slab,
                               Count& total) const {
     std::vector<PlacedBrick> bricks = part.placed;
-    std::erase_if(bricks, [&](const PlacedBrick& b) { return !slab.contains(b.brick.z); });
+    const BrickSlab beside{slab.begin - 1, slab.end + 1};
+    std::erase_if(bricks, [&](const PlacedBrick& b) { return !beside.contains(b.brick.z); });
     const std::size_t stride = std::max<std::size_t>(1, bricks.size() / kSearchedBricks);
     const VectorField foot =
         surfacePoint(step.surface, {.steps = options_.newtonSteps, .voxel = options_.voxelSize});
     const float least = step.bound - step.reach - step.margin;
     std::vector<Count> counts(bricks.size());
-    std::vector<std::uint8_t> matters(bricks.size());
+    std::vector<std::uint32_t> sides(bricks.size());
     parallelFor(bricks.size(), 16, [&](std::size_t begin, std::size_t end) {
       std::array<float, kBrickSamples> level;
       for (std::size_t b = begin; b < end; ++b) {
@@ -312,7 +312,7 @@ class LayerSampler {
         for (std::size_t i = 0; i < kBrickSamples; ++i) {
           if (samples.displacement[i] == 0) continue;
           ++counts[b].active;
-          matters[b] |= level[i] + samples.displacement[i] >= least;
+          if (level[i] + samples.displacement[i] >= least) sides[b] |= sidesReadAround(int(i));
           if (!(std::abs(level[i]) <= part.voxelSize)) continue;
           counts[b].displacement += samples.displacement[i];
           ++counts[b].near;
@@ -322,10 +322,26 @@ class LayerSampler {
     });
     std::vector<Packing> result(part.pool.size(), Packing::leaveOut);
     for (std::size_t b = 0; b < bricks.size(); ++b) {
-      total += counts[b];
-      if (matters[b]) result[std::size_t(bricks[b].pool)] = Packing::whole;
+      if (slab.contains(bricks[b].brick.z)) total += counts[b];
+      for (std::uint32_t rest = sides[b]; rest != 0; rest &= rest - 1) {
+        const Vec3i read = bricks[b].brick + detail::kBorderParts[std::size_t(std::countr_zero(rest))].side;
+        const std::int32_t pool = part.table.at(read);
+        if (pool > 0 && slab.contains(read.z)) result[std::size_t(pool)] = Packing::whole;
+      }
     }
     return result;
+  }
+
+  /// The bits of those of the kBorderParts that points less than a voxel from a sample of a brick are
+  /// interpolated from.
+  static std::uint32_t sidesReadAround(int sample) {
+    const auto along = [](int own) {
+      constexpr int kLast = BrickGrid::kBrick - 1 - BrickGrid::kAfter;
+      return std::uint32_t{2} | (own <= BrickGrid::kBefore ? 1u : 0u) | (own >= kLast ? 4u : 0u);
+    };
+    const std::uint32_t x = along(sample & 7), y = along(sample >> 3 & 7), z = along(sample >> 6);
+    const std::uint32_t xy = ((y & 1) != 0 ? x : 0) | x << 3 | ((y & 4) != 0 ? x << 6 : 0);
+    return ((z & 1) != 0 ? xy : 0) | xy << 9 | ((z & 4) != 0 ? xy << 18 : 0);
   }
 
   void report(const CumuloStep& step, const Count& all, float voxel) {
@@ -386,43 +402,6 @@ float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize
 float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {
   const float voxel = coarsestVoxel(layers, voxelSize);
   return std::max(6 * voxel, edge * 4 / 3 + 3 * voxel);
-}
-
-CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float voxelSize, double area,
-                                 const Box& box) {
-  // Measured. Displaced surfaces are larger than their base, of which the outside of a band is larger still;
-  // bricks that no later layer can bring to the surface are dropped, and sums need no bricks far inside.
-  constexpr double kGrowth = 1.8, kKept = 0.68, kSum = 0.78;
-  constexpr double kPacked = sizeof(std::uint16_t) * double(BrickGrid::kVolume);
-  constexpr double kUnpacked = sizeof(float) * double(BrickSamples::kCount);
-  // What bakes and smoothing hold beside the samples, or the codes of the bricks that are packed first.
-  constexpr double kWork = 1.4;
-  CumuloBytes bytes;
-  double sum = 0;
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const float voxel = cumuloVoxelSize(layers, i, voxelSize);
-    const float reach = displacementBound(layers, i), margin = kMarginVoxels * voxel;
-    // The band, and bricks that it only touches.
-    const double width =
-        double(reach) + (1 + double(detail::kOuterShare)) * margin + double(BrickGrid::kBrick) * voxel;
-    // Where layers reach farther than the shape is large, by Steiner's formula.
-    const double steiner =
-        area * width + std::numbers::pi * width * width * (double(box.longestSide()) + 4.0 / 3.0 * width);
-    const double bricks =
-        std::max(kGrowth * area * width, steiner) / std::pow(double(BrickGrid::kBrick) * voxel, 3);
-    const LayerParts cut = detail::partsOf(box.expanded(displacementBound(layers) + margin), voxel,
-                                           kLeastDilation + MedialSmoothingOptions{}.steps);
-    // Of a layer in parts: three, of which one has neighbours around it.
-    const double share =
-        std::min(1.0, (3.0 * cut.thickness + 3.0 * cut.halo) / double(cut.all.end - cut.all.begin));
-    const double packed = cut.count() > 1 ? kKept * bricks * kPacked : 0.0;
-    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * share * bricks * kUnpacked + packed);
-    bytes.kept += kKept * bricks * kPacked;
-    if (i + 1 == layers.size()) break;
-    bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * kSum * bricks * kUnpacked);
-    sum = kSum * bricks * kPacked;
-  }
-  return bytes;
 }
 
 GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers,

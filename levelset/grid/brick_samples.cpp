@@ -96,12 +96,8 @@ void appendPacked(PackedGrid& grid, BrickSamples samples, const std::vector<Pack
       for (std::size_t i = first + begin; i < first + end; ++i) {
         const PlacedBrick& brick = chosen[i];
         withBorders(samples, brick.brick, stored.data());
-        Interval range = rangeOfBrick(stored.data());
-        if (packing[std::size_t(brick.pool)] == Packing::absolute) {
-          for (float& value : stored) value = std::abs(value);
-          range = abs(range);
-        }
-        grid.encode(std::int32_t(start + i), stored.data(), range);
+        grid.encode(std::int32_t(start + i), samples.pool[std::size_t(brick.pool)],
+                    rangeOfBrick(stored.data()), packing[std::size_t(brick.pool)] == Packing::absolute);
         grid.place(brick.brick, std::int32_t(start + i));
       }
     });
@@ -119,7 +115,7 @@ std::shared_ptr<PackedGrid> packed(BrickSamples samples) {
   const std::size_t constants = samples.pool.size() - samples.placed.size();
   grid->append(constants - 1);
   for (std::size_t c = 1; c < constants; ++c) {
-    const std::array<float, kVolume> none{};
+    const std::array<float, BrickSamples::kCount> none{};
     grid->encode(std::int32_t(c), none.data(), samples.ranges[c]);
   }
   for (std::size_t i = 0; i < samples.table.entries.size(); ++i)

@@ -6,16 +6,14 @@
 // into vectors by 4x4 transpositions inside 128-bit blocks. That takes a fraction of the time of a gather
 // instruction per sample, and the addresses are 64-bit, so that the pool may be of any size.
 //
-// A packed grid's codes are interpolated as they are, and the result taken back to values: that is the same,
-// since interpolation is linear and its weights sum to 1.
+// The bricks of a packed grid are put together before they are read, see AssembledBricks: those around a
+// point are asked for again by the next ones.
 //
 // All arithmetic is written as differences and one product and sum per weight, never fused: constants come
 // out exactly, and the vector code gives the bits of the plain loops on every instruction set. Limit: index
 // coordinates are floats; positions inside a voxel fade beyond some 10^5 voxels from the origin.
 
 #include "nephele/levelset/grid/grid_kernels.h"
-
-#include <type_traits>
 
 #include "nephele/levelset/grid/detail/grid_map.h"
 
@@ -52,6 +50,7 @@ void tricubicGrad(const GridView& grid, const PointBlock& points, float* values,
 #else
 
 namespace hn = hwy::HWY_NAMESPACE;
+using detail::CellPart;
 using detail::GridMap;
 using detail::kCorner;
 using detail::kPlane;
@@ -65,28 +64,34 @@ using DI = hn::RebindToSigned<D>;
 using VI = hn::Vec<DI>;
 constexpr int kLanes = int(hn::MaxLanes(D()));
 
-template <class Sample>
 struct Cells {
   V fx, fy, fz;
-  const Sample* corner[kLanes];
-  V low, unit;
-
-  HWY_INLINE V decoded(V value) const {
-    if constexpr (std::is_same_v<Sample, float>)
-      return value;
-    else
-      return low + unit * value;
-  }
-  HWY_INLINE V decodedSlope(V slope) const {
-    if constexpr (std::is_same_v<Sample, float>)
-      return slope;
-    else
-      return unit * slope;
-  }
+  const float* corner[kLanes];
 };
 
-template <class Sample>
-HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cells<Sample>& cells) {
+/// The cells of a packed grid: in a brick that is put together for several points, or each on its own.
+HWY_INLINE void findBricks(const GridMap& map, const CellPart& part, const std::int32_t* place,
+                           const std::int32_t* start, const std::int32_t* isInside, int count, Cells& cells) {
+  const int used = count < kLanes ? count : kLanes;
+  for (int l = 0; l < used;) {
+    int end = l + 1;
+    while (end < used && place[end] == place[l] && isInside[end] == isInside[l]) ++end;
+    const auto at = std::size_t(place[l]);
+    const float* brick = isInside[l] ? map.bricks->find(*map.packed, at, end - l) : nullptr;
+    for (; l < end; ++l) {
+      if (brick)
+        cells.corner[l] = brick + start[l];
+      else if (isInside[l])
+        cells.corner[l] = map.bricks->cell(*map.packed, at, start[l], part.begin, part.count);
+      else
+        cells.corner[l] = map.bricks->outside(*map.packed);
+    }
+  }
+  for (int l = used; l < kLanes; ++l) cells.corner[l] = cells.corner[used - 1];
+}
+
+HWY_INLINE void locate(const GridMap& map, const CellPart& part, const PointBlock& points, int i,
+                       Cells& cells) {
   const D d;
   const DI di;
   const V x = hn::LoadU(d, points.x + i), y = hn::LoadU(d, points.y + i), z = hn::LoadU(d, points.z + i);
@@ -122,25 +127,13 @@ HWY_INLINE void locate(const GridMap& map, const PointBlock& points, int i, Cell
   hn::Store(hn::And(index, keep), di, entry);
   hn::Store(offset, di, start);
   hn::Store(keep, di, mask);
-  HWY_ALIGN float low[kLanes], high[kLanes];
-  for (int l = 0; l < kLanes; ++l) {
-    const auto pool = std::size_t(map.table[entry[l]] & mask[l]);
-    cells.corner[l] = map.samples<Sample>() + pool * BrickGrid::kVolume + start[l];
-    if constexpr (!std::is_same_v<Sample, float>) {
-      low[l] = map.ranges[pool].min;
-      high[l] = map.ranges[pool].max;
-    }
-  }
-  if constexpr (!std::is_same_v<Sample, float>) {
-    // As brickCode.
-    cells.low = hn::Load(d, low);
-    cells.unit = (hn::Load(d, high) - cells.low) / set(PackedGrid::Code::kLargest);
-  }
+  if (map.packed) return findBricks(map, part, entry, start, mask, points.count - i, cells);
+  for (int l = 0; l < kLanes; ++l)
+    cells.corner[l] = map.values + std::size_t(map.table[entry[l]] & mask[l]) * BrickGrid::kVolume + start[l];
 }
 
 /// Asks for the 4^3 samples around the points of a vector, which are read later.
-template <class Sample>
-HWY_INLINE void prefetch(const Cells<Sample>& cells) {
+HWY_INLINE void prefetch(const Cells& cells) {
   for (int l = 0; l < kLanes; ++l)
     for (int k = 0; k < 4; ++k) {
       hwy::Prefetch(cells.corner[l] + rowOffset(0, k));
@@ -149,13 +142,13 @@ HWY_INLINE void prefetch(const Cells<Sample>& cells) {
 }
 
 /// Calls `interpolate(i, cells)` for every vector of points, with what the next one reads on its way.
-template <class Sample, class Interpolate>
+template <class Interpolate>
 HWY_INLINE void forEachVector(const GridMap& map, const PointBlock& points, const Interpolate& interpolate) {
-  Cells<Sample> cells[2];
-  locate(map, points, 0, cells[0]);
+  Cells cells[2];
+  locate(map, detail::kWholeCell, points, 0, cells[0]);
   for (int i = 0, k = 0; i < points.count; i += kLanes, k ^= 1) {
     if (i + kLanes < points.count) {
-      locate(map, points, i + kLanes, cells[k ^ 1]);
+      locate(map, detail::kWholeCell, points, i + kLanes, cells[k ^ 1]);
       prefetch(cells[k ^ 1]);
     }
     interpolate(i, cells[k]);
@@ -163,19 +156,12 @@ HWY_INLINE void forEachVector(const GridMap& map, const PointBlock& points, cons
 }
 
 /// Element e of every 128-bit block b: four floats of point 4 b + e.
-template <int kElement, class Sample>
-HWY_INLINE V loadFours(const Cells<Sample>& cells, int offset) {
+template <int kElement>
+HWY_INLINE V loadFours(const Cells& cells, int offset) {
   const D d;
   const hn::Full128<float> d4;
-  const auto four = [&](int block) HWY_ATTR {
-    const Sample* samples = cells.corner[4 * block + kElement] + offset;
-    if constexpr (std::is_same_v<Sample, float>) {
-      return hn::LoadU(d4, samples);
-    } else {
-      const hn::Full128<std::int32_t> d4i;
-      return hn::ConvertTo(d4, hn::PromoteTo(d4i, hn::LoadU(hn::Full64<std::uint16_t>(), samples)));
-    }
-  };
+  const auto four = [&](int block)
+                        HWY_ATTR { return hn::LoadU(d4, cells.corner[4 * block + kElement] + offset); };
 #if HWY_MAX_BYTES >= 64
   const hn::Half<D> half;
   return hn::Combine(d, hn::Combine(half, four(3), four(2)), hn::Combine(half, four(1), four(0)));
@@ -201,8 +187,7 @@ HWY_INLINE V upper64(V a, V b) {
   return hn::BitCast(D(), hn::InterleaveUpper(d64, hn::BitCast(d64, a), hn::BitCast(d64, b)));
 }
 
-template <class Sample>
-HWY_INLINE Row loadRow(const Cells<Sample>& cells, int offset) {
+HWY_INLINE Row loadRow(const Cells& cells, int offset) {
   const D d;
   const V p0 = loadFours<0>(cells, offset), p1 = loadFours<1>(cells, offset);
   const V p2 = loadFours<2>(cells, offset), p3 = loadFours<3>(cells, offset);
@@ -216,8 +201,7 @@ HWY_INLINE V lerp(V a, V b, V f) {
 }
 
 /// One row interpolated in x; the compiler drops what loadRow makes and this does not read.
-template <class Sample>
-HWY_INLINE V rowValue(const Cells<Sample>& cells, int offset) {
+HWY_INLINE V rowValue(const Cells& cells, int offset) {
   const Row row = loadRow(cells, offset);
   return lerp(row.left, row.right, cells.fx);
 }
@@ -233,23 +217,21 @@ HWY_INLINE void storeGradient(const GridMap& map, V gx, V gy, V gz, const BlockL
   }
 }
 
-template <class Sample>
 void trilinearOf(const GridMap& map, const PointBlock& points, float* values) {
   const D d;
-  Cells<Sample> cells;
+  Cells cells;
   for (int i = 0; i < points.count; i += kLanes) {
-    locate(map, points, i, cells);
+    locate(map, detail::kLinearPart, points, i, cells);
     const V plane0 = lerp(rowValue(cells, rowOffset(1, 1)), rowValue(cells, rowOffset(2, 1)), cells.fy);
     const V plane1 = lerp(rowValue(cells, rowOffset(1, 2)), rowValue(cells, rowOffset(2, 2)), cells.fy);
-    hn::StoreU(cells.decoded(lerp(plane0, plane1, cells.fz)), d, values + i);
+    hn::StoreU(lerp(plane0, plane1, cells.fz), d, values + i);
   }
 }
 
-template <class Sample>
 void trilinearGradOf(const GridMap& map, const PointBlock& points, float* values,
                      const BlockLanes<3>& grads) {
   const D d;
-  forEachVector<Sample>(map, points, [&](int i, const Cells<Sample>& cells) HWY_ATTR {
+  forEachVector(map, points, [&](int i, const Cells& cells) HWY_ATTR {
     const V fx = cells.fx, fy = cells.fy, fz = cells.fz;
     V v[2], dx[2], dy[2], r[2][2];
     for (int k = 0; k < 2; ++k) {
@@ -267,22 +249,21 @@ void trilinearGradOf(const GridMap& map, const PointBlock& points, float* values
       const V before = rowValue(cells, rowOffset(j + 1, 0)), after = rowValue(cells, rowOffset(j + 1, 3));
       dz[j] = lerp(r[1][j] - before, after - r[0][j], fz);
     }
-    hn::StoreU(cells.decoded(lerp(v[0], v[1], fz)), d, values + i);
-    const V half = cells.decodedSlope(hn::Set(d, 0.5f));
+    hn::StoreU(lerp(v[0], v[1], fz), d, values + i);
+    const V half = hn::Set(d, 0.5f);
     storeGradient(map, half * lerp(dx[0], dx[1], fz), half * lerp(dy[0], dy[1], fz),
                   half * lerp(dz[0], dz[1], fy), grads, i);
   });
 }
 
-template <class Sample>
 void nearestOf(const GridMap& map, const PointBlock& points, float* values) {
   const D d;
-  Cells<Sample> cells;
+  Cells cells;
   HWY_ALIGN float samples[kLanes];
   for (int i = 0; i < points.count; i += kLanes) {
-    locate(map, points, i, cells);
+    locate(map, detail::kNearestPart, points, i, cells);
     for (int l = 0; l < kLanes; ++l) samples[l] = float(cells.corner[l][kCorner]);
-    hn::StoreU(cells.decoded(hn::Load(d, samples)), d, values + i);
+    hn::StoreU(hn::Load(d, samples), d, values + i);
   }
 }
 
@@ -310,12 +291,11 @@ HWY_INLINE Weights cubicSlopes(V t) {
           half * (t * (three * t - hn::Set(d, 2.0f)))};
 }
 
-template <class Sample>
 void tricubicOf(const GridMap& map, const PointBlock& points, float* values) {
   const D d;
-  Cells<Sample> cells;
+  Cells cells;
   for (int i = 0; i < points.count; i += kLanes) {
-    locate(map, points, i, cells);
+    locate(map, detail::kWholeCell, points, i, cells);
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
     V plane[4];
     for (int k = 0; k < 4; ++k) {
@@ -326,16 +306,15 @@ void tricubicOf(const GridMap& map, const PointBlock& points, float* values) {
       }
       plane[k] = wy(row);
     }
-    hn::StoreU(cells.decoded(cubicWeights(cells.fz)(plane)), d, values + i);
+    hn::StoreU(cubicWeights(cells.fz)(plane), d, values + i);
   }
 }
 
 // Flattened: left to itself, the compiler calls the body for each vector.
-template <class Sample>
 HWY_FLATTEN void tricubicGradOf(const GridMap& map, const PointBlock& points, float* values,
                                 const BlockLanes<3>& grads) {
   const D d;
-  forEachVector<Sample>(map, points, [&](int i, const Cells<Sample>& cells) HWY_ATTR {
+  forEachVector(map, points, [&](int i, const Cells& cells) HWY_ATTR {
     const Weights wx = cubicWeights(cells.fx), wy = cubicWeights(cells.fy);
     const Weights sx = cubicSlopes(cells.fx), sy = cubicSlopes(cells.fy);
     V v[4], dx[4], dy[4];
@@ -351,27 +330,26 @@ HWY_FLATTEN void tricubicGradOf(const GridMap& map, const PointBlock& points, fl
       dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
     }
     const Weights wz = cubicWeights(cells.fz), sz = cubicSlopes(cells.fz);
-    hn::StoreU(cells.decoded(wz(v)), d, values + i);
-    storeGradient(map, cells.decodedSlope(wz(dx)), cells.decodedSlope(wz(dy)),
-                  cells.decodedSlope(sz.offset(v[0], v[1], v[2], v[3])), grads, i);
+    hn::StoreU(wz(v), d, values + i);
+    storeGradient(map, wz(dx), wz(dy), sz.offset(v[0], v[1], v[2], v[3]), grads, i);
   });
 }
 
 void nearest(const GridView& grid, const PointBlock& points, float* values) {
-  (grid.codes ? nearestOf<std::uint16_t> : nearestOf<float>)(nearestMapOf(grid), points, values);
+  nearestOf(nearestMapOf(grid), points, values);
 }
 void trilinear(const GridView& grid, const PointBlock& points, float* values) {
-  (grid.codes ? trilinearOf<std::uint16_t> : trilinearOf<float>)(mapOf(grid), points, values);
+  trilinearOf(mapOf(grid), points, values);
 }
 void trilinearGrad(const GridView& grid, const PointBlock& points, float* values,
                    const BlockLanes<3>& grads) {
-  (grid.codes ? trilinearGradOf<std::uint16_t> : trilinearGradOf<float>)(mapOf(grid), points, values, grads);
+  trilinearGradOf(mapOf(grid), points, values, grads);
 }
 void tricubic(const GridView& grid, const PointBlock& points, float* values) {
-  (grid.codes ? tricubicOf<std::uint16_t> : tricubicOf<float>)(mapOf(grid), points, values);
+  tricubicOf(mapOf(grid), points, values);
 }
 void tricubicGrad(const GridView& grid, const PointBlock& points, float* values, const BlockLanes<3>& grads) {
-  (grid.codes ? tricubicGradOf<std::uint16_t> : tricubicGradOf<float>)(mapOf(grid), points, values, grads);
+  tricubicGradOf(mapOf(grid), points, values, grads);
 }
 
 #endif

@@ -31,8 +31,8 @@ GridMap mapOf(const GridView& grid) {
               true,
               grid.layout->table().data(),
               grid.values,
-              grid.codes,
-              grid.layout->ranges().data()};
+              grid.packed,
+              grid.packed ? &AssembledBricks::local() : nullptr};
   for (int axis = 0; axis < 3; ++axis) {
     map.first[axis] = grid.layout->firstBrick()[axis];
     map.low[axis] = notBelow(8.0 * grid.layout->firstBrick()[axis]);
@@ -62,6 +62,7 @@ bool fillIfEmpty(const GridView& grid, const PointBlock& points, float* values, 
 
 namespace {
 
+using detail::CellPart;
 using detail::fillIfEmpty;
 using detail::GridMap;
 using detail::kCorner;
@@ -71,27 +72,12 @@ using detail::nearestMapOf;
 using detail::rowOffset;
 
 /// The cell of a point: its fractions and the stored sample one before its corner in x, y and z.
-template <class Sample>
 struct Cell {
   float fx, fy, fz;
-  const Sample* corner;
-  PackedGrid::Code code;
-
-  Cell(const GridMap& map, const float (&f)[3], std::size_t pool, int offset)
-      : fx(f[0]),
-        fy(f[1]),
-        fz(f[2]),
-        corner(map.samples<Sample>() + pool * BrickGrid::kVolume + offset),
-        code(PackedGrid::Code::of(map.ranges[pool])) {}
-
-  float decoded(float value) const {
-    return std::is_same_v<Sample, float> ? value : code.low + code.unit * value;
-  }
-  float decodedSlope(float slope) const { return std::is_same_v<Sample, float> ? slope : code.unit * slope; }
+  const float* corner;
 };
 
-template <class Sample>
-Cell<Sample> locate(const GridMap& map, float x, float y, float z) {
+Cell locate(const GridMap& map, const CellPart& part, float x, float y, float z) {
   const auto& m = map.linear;
   const auto& t = map.translation;
   float q[3];
@@ -101,7 +87,8 @@ Cell<Sample> locate(const GridMap& map, float x, float y, float z) {
     for (int a = 0; a < 3; ++a) q[a] = m[3 * a] * x + m[3 * a + 1] * y + m[3 * a + 2] * z + t[a];
   }
   for (int a = 0; a < 3; ++a)
-    if (!(q[a] >= map.low[a] && q[a] < map.high[a])) return {map, {0, 0, 0}, 0, 0};
+    if (!(q[a] >= map.low[a] && q[a] < map.high[a]))
+      return {0, 0, 0, map.packed ? map.bricks->outside(*map.packed) : map.values};
   int brick[3], local[3];
   float f[3];
   for (int a = 0; a < 3; ++a) {
@@ -110,9 +97,11 @@ Cell<Sample> locate(const GridMap& map, float x, float y, float z) {
     brick[a] = brickOf(int(cell)) - map.first[a];
     local[a] = insideBrick(int(cell));
   }
-  const std::size_t pool =
-      std::size_t(map.table[(std::size_t(brick[2]) * map.countY + brick[1]) * map.countX + brick[0]]);
-  return {map, f, pool, (local[2] * kRow + local[1]) * kRow + local[0]};
+  const std::size_t place = (std::size_t(brick[2]) * map.countY + brick[1]) * map.countX + brick[0];
+  const int offset = (local[2] * kRow + local[1]) * kRow + local[0];
+  const float* corner = map.packed ? map.bricks->cell(*map.packed, place, offset, part.begin, part.count)
+                                   : map.values + std::size_t(map.table[place]) * BrickGrid::kVolume + offset;
+  return {f[0], f[1], f[2], corner};
 }
 
 float lerp(float a, float b, float f) {
@@ -147,39 +136,37 @@ CubicWeights cubicSlopes(float t) {
           0.5f * (t * (3.0f * t - 2.0f))};
 }
 
-template <class Sample>
 void trilinearLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
+    const Cell cell = locate(map, detail::kLinearPart, points.x[i], points.y[i], points.z[i]);
     float plane[2];
     for (int k = 0; k < 2; ++k) {
-      const Sample* a = cell.corner + rowOffset(1, k + 1);
-      const Sample* b = cell.corner + rowOffset(2, k + 1);
+      const float* a = cell.corner + rowOffset(1, k + 1);
+      const float* b = cell.corner + rowOffset(2, k + 1);
       plane[k] = lerp(lerp(a[1], a[2], cell.fx), lerp(b[1], b[2], cell.fx), cell.fy);
     }
-    values[i] = cell.decoded(lerp(plane[0], plane[1], cell.fz));
+    values[i] = lerp(plane[0], plane[1], cell.fz);
   }
 }
 
-template <class Sample>
 void trilinearGradLoop(const GridMap& map, const PointBlock& points, float* values,
                        const BlockLanes<3>& grads) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
+    const Cell cell = locate(map, detail::kWholeCell, points.x[i], points.y[i], points.z[i]);
     const float fx = cell.fx, fy = cell.fy, fz = cell.fz;
     // r[k][j] and dx[k][j]: the rows at z - 1 + k, y - 1 + j, interpolated in x, and their difference along
     // x.
     float r[4][4] = {}, dx[4][4] = {};
     for (int k = 0; k < 4; ++k)
       for (int j = 0; j < 4; ++j) {
-        const Sample* row = cell.corner + rowOffset(j, k);
+        const float* row = cell.corner + rowOffset(j, k);
         r[k][j] = lerp(row[1], row[2], fx);
         dx[k][j] = lerp(float(row[2]) - float(row[0]), float(row[3]) - float(row[1]), fx);
       }
     const auto alongY = [&](int k) { return lerp(r[k][2] - r[k][0], r[k][3] - r[k][1], fy); };
     const auto alongZ = [&](int j) { return lerp(r[2][j] - r[0][j], r[3][j] - r[1][j], fz); };
-    values[i] = cell.decoded(lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz));
-    const float half = cell.decodedSlope(0.5f);
+    values[i] = lerp(lerp(r[1][1], r[1][2], fy), lerp(r[2][1], r[2][2], fy), fz);
+    const float half = 0.5f;
     storeGradient(map,
                   {half * lerp(lerp(dx[1][1], dx[1][2], fy), lerp(dx[2][1], dx[2][2], fy), fz),
                    half * lerp(alongY(1), alongY(2), fz), half * lerp(alongZ(1), alongZ(2), fy)},
@@ -187,44 +174,41 @@ void trilinearGradLoop(const GridMap& map, const PointBlock& points, float* valu
   }
 }
 
-template <class Sample>
 void nearestLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
-    values[i] = cell.decoded(cell.corner[kCorner]);
+    const Cell cell = locate(map, detail::kNearestPart, points.x[i], points.y[i], points.z[i]);
+    values[i] = cell.corner[kCorner];
   }
 }
 
-template <class Sample>
 void tricubicLoop(const GridMap& map, const PointBlock& points, float* values) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
+    const Cell cell = locate(map, detail::kWholeCell, points.x[i], points.y[i], points.z[i]);
     const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
     float plane[4];
     for (int k = 0; k < 4; ++k) {
       float row[4];
       for (int j = 0; j < 4; ++j) {
-        const Sample* s = cell.corner + rowOffset(j, k);
+        const float* s = cell.corner + rowOffset(j, k);
         row[j] = wx(s[0], s[1], s[2], s[3]);
       }
       plane[k] = wy(row[0], row[1], row[2], row[3]);
     }
-    values[i] = cell.decoded(wz(plane[0], plane[1], plane[2], plane[3]));
+    values[i] = wz(plane[0], plane[1], plane[2], plane[3]);
   }
 }
 
-template <class Sample>
 void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* values,
                       const BlockLanes<3>& grads) {
   for (int i = 0; i < points.count; ++i) {
-    const Cell<Sample> cell = locate<Sample>(map, points.x[i], points.y[i], points.z[i]);
+    const Cell cell = locate(map, detail::kWholeCell, points.x[i], points.y[i], points.z[i]);
     const CubicWeights wx = cubicWeights(cell.fx), wy = cubicWeights(cell.fy), wz = cubicWeights(cell.fz);
     const CubicWeights sx = cubicSlopes(cell.fx), sy = cubicSlopes(cell.fy), sz = cubicSlopes(cell.fz);
     float v[4], dx[4], dy[4];
     for (int k = 0; k < 4; ++k) {
       float row[4], slope[4];
       for (int j = 0; j < 4; ++j) {
-        const Sample* s = cell.corner + rowOffset(j, k);
+        const float* s = cell.corner + rowOffset(j, k);
         row[j] = wx(s[0], s[1], s[2], s[3]);
         slope[j] = sx.offset(s[0], s[1], s[2], s[3]);
       }
@@ -232,11 +216,10 @@ void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* value
       dx[k] = wy(slope[0], slope[1], slope[2], slope[3]);
       dy[k] = sy.offset(row[0], row[1], row[2], row[3]);
     }
-    values[i] = cell.decoded(wz(v[0], v[1], v[2], v[3]));
+    values[i] = wz(v[0], v[1], v[2], v[3]);
     storeGradient(
         map,
-        {cell.decodedSlope(wz(dx[0], dx[1], dx[2], dx[3])), cell.decodedSlope(wz(dy[0], dy[1], dy[2], dy[3])),
-         cell.decodedSlope(sz.offset(v[0], v[1], v[2], v[3]))},
+        {wz(dx[0], dx[1], dx[2], dx[3]), wz(dy[0], dy[1], dy[2], dy[3]), sz.offset(v[0], v[1], v[2], v[3])},
         grads, i);
   }
 }
@@ -245,31 +228,29 @@ void tricubicGradLoop(const GridMap& map, const PointBlock& points, float* value
 
 void sampleNearestScalar(const GridView& grid, const PointBlock& points, float* values) {
   if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.codes ? nearestLoop<std::uint16_t> : nearestLoop<float>)(nearestMapOf(grid), points, values);
+  nearestLoop(nearestMapOf(grid), points, values);
 }
 
 void sampleTrilinearScalar(const GridView& grid, const PointBlock& points, float* values) {
   if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.codes ? trilinearLoop<std::uint16_t> : trilinearLoop<float>)(mapOf(grid), points, values);
+  trilinearLoop(mapOf(grid), points, values);
 }
 
 void sampleTrilinearGradScalar(const GridView& grid, const PointBlock& points, float* values,
                                const BlockLanes<3>& grads) {
   if (fillIfEmpty(grid, points, values, &grads)) return;
-  (grid.codes ? trilinearGradLoop<std::uint16_t> : trilinearGradLoop<float>)(mapOf(grid), points, values,
-                                                                             grads);
+  trilinearGradLoop(mapOf(grid), points, values, grads);
 }
 
 void sampleTricubicScalar(const GridView& grid, const PointBlock& points, float* values) {
   if (fillIfEmpty(grid, points, values, nullptr)) return;
-  (grid.codes ? tricubicLoop<std::uint16_t> : tricubicLoop<float>)(mapOf(grid), points, values);
+  tricubicLoop(mapOf(grid), points, values);
 }
 
 void sampleTricubicGradScalar(const GridView& grid, const PointBlock& points, float* values,
                               const BlockLanes<3>& grads) {
   if (fillIfEmpty(grid, points, values, &grads)) return;
-  (grid.codes ? tricubicGradLoop<std::uint16_t> : tricubicGradLoop<float>)(mapOf(grid), points, values,
-                                                                           grads);
+  tricubicGradLoop(mapOf(grid), points, values, grads);
 }
 
 }  // namespace nephele

@@ -5,11 +5,18 @@
 
 #include "nephele/levelset/grid/brick_samples.h"
 
-/// How the grid of a layer is made in parts along z, since samples take more memory until they are packed.
+/// How large the grid of a layer is, and how it is made in parts along z, since samples take more memory
+/// until they are packed.
 namespace nephele::detail {
 
 /// A layer with no more positions of bricks than this is baked in one piece: some hundred megabytes.
 inline constexpr double kWholePositions = 1 << 20;
+
+/// Jumps are smoothed over at least this many voxels of a layer's grid to either side: fewer leave edges too
+/// steep.
+inline constexpr int kLeastDilation = 2;
+/// A layer's band is this many of its voxels wider on either side than where its displacement matters.
+inline constexpr float kMarginVoxels = 4;
 
 /// Bricks begin <= z < end.
 struct BrickSlab {

@@ -2,9 +2,8 @@
 
 #include <array>
 #include <cstdint>
-#include <type_traits>
 
-#include "nephele/levelset/grid/packed_grid.h"
+#include "nephele/levelset/grid/detail/assembled_bricks.h"
 #include "nephele/modeling/field/field_node.h"
 
 /// What the kernels of grids and their plain loops share.
@@ -31,18 +30,16 @@ struct GridMap {
   bool diagonal;
   const std::int32_t* table;
   const float* values;
-  const std::uint16_t* codes;
-  const Interval* ranges;
-
-  /// Samples as floats, or the codes of a packed grid.
-  template <class Sample>
-  const Sample* samples() const {
-    if constexpr (std::is_same_v<Sample, float>)
-      return values;
-    else
-      return codes;
-  }
+  /// The grid, if it is packed, and where its bricks are put together.
+  const PackedGrid* packed;
+  AssembledBricks* bricks;
 };
+
+/// Which samples of a cell are read, of 0 to 3 along each axis.
+struct CellPart {
+  int begin, count;
+};
+constexpr CellPart kNearestPart{1, 1}, kLinearPart{1, 2}, kWholeCell{0, 4};
 
 GridMap mapOf(const GridView& grid);
 

@@ -230,12 +230,12 @@ TEST(CumuloFields, MemoryIsEstimatedNearWhatWasMeasured) {
     double megabytes;
   };
   // Peak resident memory of `nephele cloud`, amplitude 2.5 %, frequency 4.4, edge 0.35 %.
-  for (const Measured& m : {Measured{256, 4, 152},
-                            {512, 3, 162},
-                            {512, 4, 383},
-                            {1024, 1, 349},
-                            {1024, 4, 546},
-                            {2048, 4, 1834}}) {
+  for (const Measured& m : {Measured{256, 4, 125},
+                            {512, 3, 137},
+                            {512, 4, 276},
+                            {1024, 1, 285},
+                            {1024, 4, 409},
+                            {2048, 4, 1438}}) {
     CloudOptions options;
     options.layers =
         cumuloLayers({.layers = m.layers, .amplitude = 0.025f * longest, .frequency = 4.4f / longest});

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
+#include <utility>
 
 #include "nephele/levelset/grid/brick_ranges.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -85,7 +87,7 @@ TEST(BrickGrid, KnowsItsBoxAndSize) {
 TEST(BrickGrid, PackingKeepsSamplesWithinHalfACode) {
   const auto grid = denseGrid({-1, 0, 2}, {2, 2, 2}, scatter, {}, 7.0f);
   const PackedGrid packed(*grid);
-  EXPECT_LT(packed.memoryBytes(), 0.55 * double(grid->memoryBytes()));
+  EXPECT_LT(packed.memoryBytes(), 0.25 * double(grid->memoryBytes()));
   EXPECT_EQ(packed.ranges(), grid->ranges());
   for (int z = 16; z < 32; ++z)
     for (int y = 0; y < 16; ++y)
@@ -94,6 +96,53 @@ TEST(BrickGrid, PackingKeepsSamplesWithinHalfACode) {
         ASSERT_NEAR(packed.at({x, y, z}), grid->at({x, y, z}), (range.max - range.min) / 131070.0f + 1e-6f);
       }
   EXPECT_EQ(packed.at({100, 0, 0}), 7.0f);
+}
+
+TEST(BrickGrid, PackedBricksAreAssembledWithTheBordersOfTheirNeighbours) {
+  const auto grid = denseGrid({-1, 0, 2}, {2, 2, 2}, scatter, {}, 7.0f);
+  const PackedGrid packed(*grid);
+  std::array<float, BrickGrid::kVolume> brick, cell;
+  for (std::size_t place = 0; place < packed.table().size(); ++place) {
+    packed.assemble(place, brick.data());
+    const Vec3i first = packed.places().at(place) * BrickGrid::kBrick;
+    for (int z = -1; z < 10; ++z)
+      for (int y = -1; y < 10; ++y)
+        for (int x = -1; x < 10; ++x)
+          ASSERT_EQ(brick[std::size_t(sampleOffset(x, y, z))], packed.at(first + Vec3i{x, y, z}));
+    // Every cell alone: all of it, its middle, and its corner.
+    for (const auto& [begin, count] : {std::pair{0, 4}, {1, 2}, {1, 1}})
+      for (int corner = 0; corner < kBrickSamples; ++corner) {
+        const int offset = sampleOffset((corner & 7) - 1, (corner >> 3 & 7) - 1, (corner >> 6) - 1);
+        cell.fill(-99);
+        packed.assembleCell(place, offset, begin, count, cell.data());
+        for (int z = begin; z < begin + count; ++z)
+          for (int y = begin; y < begin + count; ++y)
+            for (int x = begin; x < begin + count; ++x) {
+              const int at = (z * BrickGrid::kWidth + y) * BrickGrid::kWidth + x;
+              ASSERT_EQ(cell[std::size_t(at)], brick[std::size_t(offset + at)]);
+            }
+      }
+  }
+}
+
+TEST(BrickGrid, PackedBricksWithoutSignsAreSeenWithThemByTheirNeighbours) {
+  // -1 and 1 by turns, in two bricks side by side.
+  std::array<float, kBrickSamples> samples;
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = i % 2 == 0 ? -1.0f : 1.0f;
+  PackedGrid grid({}, {{0, 0, 0}, {2, 1, 1}}, 0.0f);
+  grid.append(2);
+  for (const std::int32_t pool : {1, 2}) {
+    grid.encode(pool, samples.data(), {-1, 1}, pool == 2);
+    grid.place({pool - 1, 0, 0}, pool);
+  }
+  std::array<float, BrickGrid::kVolume> signs, signless;
+  grid.assemble(0, signs.data());
+  grid.assemble(1, signless.data());
+  EXPECT_NEAR(signs[std::size_t(sampleOffset(0, 3, 3))], -1, 1e-6);
+  EXPECT_NEAR(signs[std::size_t(sampleOffset(8, 3, 3))], -1, 1e-6);
+  EXPECT_NEAR(signless[std::size_t(sampleOffset(0, 3, 3))], 1, 1e-6);
+  EXPECT_NEAR(signless[std::size_t(sampleOffset(-1, 3, 3))], 1, 1e-6);
+  EXPECT_NEAR(signless[std::size_t(sampleOffset(-1, 3, 4))], 1, 1e-6);
 }
 
 TEST(BrickGrid, RefusesTablesThatDoNotFit) {

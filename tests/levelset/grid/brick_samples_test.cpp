@@ -34,7 +34,7 @@ TEST(BrickSamples, PackToWhatTheWholeGridPacksTo) {
     for (std::size_t i = 0; i < whole->table().size(); ++i) {
       const std::int32_t a = packed->table()[i], b = whole->table()[i];
       ASSERT_EQ(packed->ranges()[std::size_t(a)], whole->ranges()[std::size_t(b)]);
-      ASSERT_TRUE(std::equal(packed->codes(a), packed->codes(a) + BrickGrid::kVolume, whole->codes(b)));
+      ASSERT_TRUE(std::equal(packed->codes(a), packed->codes(a) + kBrickSamples, whole->codes(b)));
     }
   }
 }
