@@ -66,8 +66,8 @@ RenderVolume wispsOf(const LookPlan& plan, LookPlan::Tier tier, Run& run) {
       "use larger voxels (a lower --resolution or a larger --voxel-size), or fewer or smaller wisps");
   run.begin("bake");
   const DotVolume dots = namingFile(wisps.input, [&] { return bakeWisps(guides, options, run); });
-  return volumeOf(toBricks(dots.densityGrid()), plan.picture.volumes,
-                  {plan.picture.shutter, false, plan.scene.objects.any()}, run);
+  return volumeOf([&](const BrickSink& made) { return toBricks(dots.densityGrid(), Beside::varying, made); },
+                  plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
 }
 
 /// Without layers that coarse voxels cannot show, and that take the most time.
@@ -107,17 +107,16 @@ LookTier::Growing::Growing(const CloudArguments& itsArguments, std::shared_ptr<c
       sources(arguments.sources(*mesh, run)),
       options(optionsOf(arguments, tier, sources, run)) {}
 
-RenderVolume LookTier::Growing::volume(const LookPlan& plan, Run& run) {
+RenderVolume LookTier::Growing::volume(const LookPlan& plan, bool isCoded, Run& run) {
   const CloudAdvectionArguments& advection = arguments.advection;
-  const auto density = [&] { return makeCloud(*levels, options, run).density; };
-  std::shared_ptr<const BrickGrid> bricks;
-  if (advection.isAny(sources)) {
+  const auto bricks = [&](const BrickSink& made) -> std::shared_ptr<const BrickGrid> {
+    VoxelGrid<float> density = makeCloud(*levels, options, run).density;
+    if (!advection.isAny(sources)) return toBricks(density, Beside::varying, made);
     const VdbGridLabel label{"density", VdbGridInfo::Class::fogVolume, false};
-    bricks = toBricks(advection.carried(toVdb(density(), label), sources, arguments.seed, run));
-  } else {
-    bricks = toBricks(density());
-  }
-  return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, false, plan.scene.objects.any()}, run);
+    return toBricks(advection.carried(toVdb(std::move(density), label), sources, arguments.seed, run), made);
+  };
+  return volumeOf(bricks, plan.picture.volumes, {plan.picture.shutter, isCoded, plan.scene.objects.any()},
+                  run);
 }
 
 std::unique_ptr<LookTier::Growing> LookTier::grown(const LookPlan& plan, Run& run) {
@@ -167,9 +166,10 @@ std::shared_ptr<const RenderVolume> LookTier::volume(const LookPlan& plan, LookT
   if (plan.growsCloud()) {
     if (auto kept = stages_.volumeAt(keysOf(plan))) return kept;
     const std::unique_ptr<Growing> growing = grown(plan, run);
+    const bool isCoded = tier_ == LookPlan::Tier::fine && key != samplesKey_;
     return stages_.volume(key, [&] {
-      RenderVolume made = growing->volume(plan, run);
-      if (tier_ == LookPlan::Tier::fine && key != samplesKey_) made.giveUpSamples();
+      RenderVolume made = growing->volume(plan, isCoded, run);
+      if (isCoded) made.giveUpSamples();
       return made;
     });
   }

@@ -36,7 +36,8 @@ class LookTier {
 
     Growing(const CloudArguments& itsArguments, std::shared_ptr<const Mesh> itsMesh, LookPlan::Tier tier,
             const Run& run);
-    RenderVolume volume(const LookPlan& plan, Run& run);
+    /// `isCoded`: its samples are not asked for.
+    RenderVolume volume(const LookPlan& plan, bool isCoded, Run& run);
   };
   std::unique_ptr<Growing> grown(const LookPlan& plan, Run& run);
   /// A script that has been run, kept until it or its parameters change.

@@ -80,6 +80,18 @@ VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& densi
   return grids;
 }
 
+/// Codes the density of a part while it is made, where that is asked for and enough.
+BrickSink codingOf(VolumePart& part, const VolumeOptions& options, const VolumeReading& reading, Run& run) {
+  if (!reading.coded || part.share != 1 || options.hasOthers()) return {};
+  part.coded = std::make_shared<CodedDensity>();
+  return [coded = part.coded, &run](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
+    if (begin == 0)
+      run.requireMemory(CodedBricks::estimateBytes(double(grid.poolSize()), double(grid.places().size())),
+                        "make the volume with larger voxels");
+    coded->take(grid, begin, end);
+  };
+}
+
 VolumePart readPart(const std::string& path, std::size_t index, const VolumeOptions& options,
                     const VolumeReading& reading, Run& run) {
   const auto nameIn = [&](const std::vector<std::string>& names) {
@@ -90,16 +102,7 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   part.share = float(entryOf(options.densityScales, index, 1.0));
   // No float tells what lies behind so little from what lies behind nothing.
   if (reading.holdsObjects && part.share == 0) part.share = 1e-12f;
-  BrickSink made;
-  if (reading.coded && part.share == 1 && !options.hasOthers()) {
-    part.coded = std::make_shared<CodedDensity>();
-    made = [coded = part.coded, &run](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
-      if (begin == 0)
-        run.requireMemory(CodedBricks::estimateBytes(double(grid.poolSize()), double(grid.places().size())),
-                          "make the volume with larger voxels");
-      coded->take(grid, begin, end);
-    };
-  }
+  const BrickSink made = codingOf(part, options, reading, run);
   part.density = readFog(path, nameIn(options.densityGrids), run, made);
   if (const std::string name = nameIn(options.colourGrids); !name.empty())
     part.colour = readThree(path, name);
@@ -201,8 +204,8 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   return *std::move(only);
 }
 
-RenderVolume volumeOf(const std::shared_ptr<const BrickGrid>& density, const VolumeOptions& options,
-                      const VolumeReading& reading, Run& run) {
+RenderVolume volumeOf(const std::function<std::shared_ptr<const BrickGrid>(const BrickSink&)>& make,
+                      const VolumeOptions& options, const VolumeReading& reading, Run& run) {
   const auto isAsked = [](const char* option, const std::vector<std::string>& names) {
     if (names.empty() || names[0] == "none") return false;
     if (names[0] != "density")
@@ -211,10 +214,11 @@ RenderVolume volumeOf(const std::shared_ptr<const BrickGrid>& density, const Vol
     return true;
   };
   VolumePart part;
-  part.density = density;
   isAsked("--grid", options.densityGrids);
   part.share = float(entryOf(options.densityScales, 0, 1.0));
   if (reading.holdsObjects && part.share == 0) part.share = 1e-12f;
+  part.density = make(codingOf(part, options, reading, run));
+  const std::shared_ptr<const BrickGrid>& density = part.density;
   if (isAsked("--color-grid", options.colourGrids))
     part.colour = {density, density, density};
   else if (!options.color.empty())

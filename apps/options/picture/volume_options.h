@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,9 +48,9 @@ struct VolumeReading {
 RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
                          const VolumeReading& reading, Run& run);
 
-/// The same of a density that is there already, as if a file held it and nothing else, as 'density'.
-/// @throws Error for names of other grids.
-RenderVolume volumeOf(const std::shared_ptr<const BrickGrid>& density, const VolumeOptions& options,
-                      const VolumeReading& reading, Run& run);
+/// The same of a density that `make` makes, telling of its bricks, as if a file held it and nothing else, as
+/// 'density'. @throws Error for names of other grids.
+RenderVolume volumeOf(const std::function<std::shared_ptr<const BrickGrid>(const BrickSink&)>& make,
+                      const VolumeOptions& options, const VolumeReading& reading, Run& run);
 
 }  // namespace nephele::apps

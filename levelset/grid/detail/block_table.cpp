@@ -168,7 +168,7 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
 
 namespace nephele {
 
-std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside) {
+std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside, const BrickSink& made) {
   constexpr int kFar = std::numeric_limits<int>::max();
   Vec3i first{kFar, kFar, kFar}, last = -first;
   grid.forEachBrick([&](const Vec3i& brick, std::int32_t) {
@@ -186,7 +186,7 @@ std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside)
       blocks.blocks.push_back(grid.samples(std::int32_t(i)));
     grid.forEachBrick([&](const Vec3i& brick, std::int32_t entry) { blocks.codes[brick] = entry + 1; });
   }
-  return detail::gatherBricks(blocks, grid.lattice(), beside, "'grid'");
+  return detail::gatherBricks(blocks, grid.lattice(), beside, "'grid'", made);
 }
 
 VoxelGrid<float> toVoxels(const BrickGrid& bricks) {
