@@ -93,10 +93,13 @@ struct Surfaces::Scene {
     if (device) rtcReleaseDevice(device);
   }
 
-  // Embree's form of a ray.
+  // Embree's form of a ray; false where it begins farther away than Embree can tell, and meets nothing.
   template <class EmbreeRay>
-  void set(EmbreeRay& out, const Ray& ray, double distance) const {
+  [[nodiscard]] bool set(EmbreeRay& out, const Ray& ray, double distance) const {
+    constexpr float kFarthest = 1e18f;
     const Vec3f origin(ray.origin - centre), direction(ray.direction);
+    for (int axis = 0; axis != 3; ++axis)
+      if (!(std::abs(origin[axis]) < kFarthest)) return false;
     out.org_x = origin.x, out.org_y = origin.y, out.org_z = origin.z;
     out.dir_x = direction.x, out.dir_y = direction.y, out.dir_z = direction.z;
     out.tnear = 0;
@@ -104,6 +107,7 @@ struct Surfaces::Scene {
     out.time = 0;
     out.mask = ~0u;
     out.id = out.flags = 0;
+    return true;
   }
 };
 
@@ -186,7 +190,7 @@ Surfaces::~Surfaces() = default;
 
 std::optional<Surfaces::Hit> Surfaces::hit(const Ray& ray) const {
   RTCRayHit query{};
-  scene_->set(query.ray, ray, std::numeric_limits<double>::infinity());
+  if (!scene_->set(query.ray, ray, std::numeric_limits<double>::infinity())) return std::nullopt;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
@@ -227,7 +231,7 @@ std::optional<Surfaces::Hit> Surfaces::hit(const Ray& ray) const {
 bool Surfaces::occluded(const Ray& ray, double distance) const {
   if (!castsShadows_) return false;
   RTCRay query{};
-  scene_->set(query, ray, distance);
+  if (!scene_->set(query, ray, distance)) return false;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene_->shading, &context, &query);
@@ -238,7 +242,7 @@ double Surfaces::distanceToShade(const Ray& ray) const {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   if (!castsShadows_) return infinite;
   RTCRayHit query{};
-  scene_->set(query.ray, ray, infinite);
+  if (!scene_->set(query.ray, ray, infinite)) return infinite;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;

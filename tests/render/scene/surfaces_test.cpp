@@ -69,6 +69,18 @@ TEST(Surfaces, AreHitWhereTheyAre) {
   EXPECT_FALSE(surfaces.occluded({{0, 0, 7}, {0, 0, -1}}, 8));
 }
 
+TEST(Surfaces, AreNotMetFromFartherAwayThanFloatsTell) {
+  // Embree ends the program where rays begin beyond 1.8e18 from what it holds.
+  const Surfaces surfaces({{square(0)}});
+  for (const double away : {1e20, 1e30, 1e300}) {
+    const Ray ray{{0.3, 0.4, away}, {0, 0, -1}};
+    EXPECT_FALSE(surfaces.hit(ray));
+    EXPECT_FALSE(surfaces.occluded(ray, INFINITY));
+    EXPECT_EQ(surfaces.distanceToShade(ray), INFINITY);
+  }
+  EXPECT_TRUE(surfaces.hit({{0.3, 0.4, 1e15}, {0, 0, -1}}));
+}
+
 TEST(Surfaces, ShowCheckersAndTextures) {
   auto texture = std::make_shared<Image>();
   texture->width = texture->height = 2;
