@@ -32,7 +32,6 @@
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/brick_memo.h"
 #include "nephele/levelset/grid/brick_samples.h"
-#include "nephele/levelset/grid/detail/brick_borders.h"
 #include "nephele/levelset/grid/grid_field.h"
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
@@ -312,7 +311,7 @@ class LayerSampler {
         for (std::size_t i = 0; i < kBrickSamples; ++i) {
           if (samples.displacement[i] == 0) continue;
           ++counts[b].active;
-          if (level[i] + samples.displacement[i] >= least) sides[b] |= sidesReadAround(int(i));
+          if (level[i] + samples.displacement[i] >= least) sides[b] |= detail::neighboursReadAround(int(i));
           if (!(std::abs(level[i]) <= part.voxelSize)) continue;
           counts[b].displacement += samples.displacement[i];
           ++counts[b].near;
@@ -324,24 +323,12 @@ class LayerSampler {
     for (std::size_t b = 0; b < bricks.size(); ++b) {
       if (slab.contains(bricks[b].brick.z)) total += counts[b];
       for (std::uint32_t rest = sides[b]; rest != 0; rest &= rest - 1) {
-        const Vec3i read = bricks[b].brick + detail::kBorderParts[std::size_t(std::countr_zero(rest))].side;
+        const Vec3i read = bricks[b].brick + detail::neighbour(std::countr_zero(rest));
         const std::int32_t pool = part.table.at(read);
         if (pool > 0 && slab.contains(read.z)) result[std::size_t(pool)] = Packing::whole;
       }
     }
     return result;
-  }
-
-  /// The bits of those of the kBorderParts that points less than a voxel from a sample of a brick are
-  /// interpolated from.
-  static std::uint32_t sidesReadAround(int sample) {
-    const auto along = [](int own) {
-      constexpr int kLast = BrickGrid::kBrick - 1 - BrickGrid::kAfter;
-      return std::uint32_t{2} | (own <= BrickGrid::kBefore ? 1u : 0u) | (own >= kLast ? 4u : 0u);
-    };
-    const std::uint32_t x = along(sample & 7), y = along(sample >> 3 & 7), z = along(sample >> 6);
-    const std::uint32_t xy = ((y & 1) != 0 ? x : 0) | x << 3 | ((y & 4) != 0 ? x << 6 : 0);
-    return ((z & 1) != 0 ? xy : 0) | xy << 9 | ((z & 4) != 0 ? xy << 18 : 0);
   }
 
   void report(const CumuloStep& step, const Count& all, float voxel) {

@@ -70,6 +70,16 @@ void BrickSamples::separate() {
   }
 }
 
+std::uint32_t neighboursReadAround(int sample) {
+  const auto along = [](int own) {
+    constexpr int kLast = BrickGrid::kBrick - 1 - BrickGrid::kAfter;
+    return std::uint32_t{2} | (own <= BrickGrid::kBefore ? 1u : 0u) | (own >= kLast ? 4u : 0u);
+  };
+  const std::uint32_t x = along(sample & 7), y = along(sample >> 3 & 7), z = along(sample >> 6);
+  const std::uint32_t xy = ((y & 1) != 0 ? x : 0) | x << 3 | ((y & 4) != 0 ? x << 6 : 0);
+  return ((z & 1) != 0 ? xy : 0) | xy << 9 | ((z & 4) != 0 ? xy << 18 : 0);
+}
+
 std::shared_ptr<PackedGrid> emptyPackedGrid(const BrickSamples& samples) {
   return std::make_shared<PackedGrid>(Lattice::uniform(samples.voxelSize), samples.places(),
                                       samples.background);

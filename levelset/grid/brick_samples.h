@@ -94,6 +94,13 @@ enum class Packing : std::uint8_t {
   absolute  ///< Of all samples that the brick stores, the absolute value.
 };
 
+/// The bricks around a brick, itself among them, 0 to 26: from where it stands.
+constexpr Vec3i neighbour(int number) {
+  return {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
+}
+/// A bit for each of them that points less than a voxel from a sample of the brick are interpolated from.
+std::uint32_t neighboursReadAround(int sample);
+
 /// Appends bricks of `samples` with their borders to a packed grid whose table covers theirs; `packing` has
 /// an entry for every pool brick. The stores are given back while it works, from below in z. Uses all cores.
 /// @throws Error if a sample is not finite.

@@ -72,6 +72,23 @@ TEST(BrickSamples, AppendedBricksFollowTheOthers) {
   }
 }
 
+TEST(BrickSamples, KnowWhichBricksAreReadAroundThem) {
+  // Cells within a voxel of a sample read from 2 before it to 3 after it: bricks of 8 that these touch.
+  for (const int sample : {0, 1, 2, 5, 7, 8 * 3 + 3, 64 * 7 + 8 + 4, 511}) {
+    const Vec3i own{sample & 7, sample >> 3 & 7, sample >> 6};
+    std::uint32_t wanted = 0;
+    for (int number = 0; number < 27; ++number) {
+      bool isRead = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int first = detail::neighbour(number)[axis] * 8;
+        isRead &= own[axis] - 2 <= first + 7 && own[axis] + 3 >= first;
+      }
+      wanted |= isRead ? 1u << number : 0;
+    }
+    EXPECT_EQ(detail::neighboursReadAround(sample), wanted) << sample;
+  }
+}
+
 TEST(BrickSamples, RefuseToPackWhatIsNotFinite) {
   const ScalarField broken = sphere({}, 1) * std::numeric_limits<float>::infinity();
   EXPECT_THROW(detail::packed(detail::bakeSamples(broken, {.voxelSize = 0.1f, .box = kBox})), Error);
