@@ -9,8 +9,8 @@
 /// All functions read up to `points.count` points and may write up to the padded count. Outside the table,
 /// and at coordinates that are infinite or NaN, the value is that of pool brick 0, the background, and the
 /// gradient is 0. Gradients are with respect to world coordinates, for rotated and sheared maps too. Shared
-/// constants need no care. No allocation, no locks, no exceptions. Every function has a plain loop beside it
-/// that gives the same bits.
+/// constants need no care. No allocation, but for the first packed grid of a thread, no locks, no exceptions.
+/// Every function has a plain loop beside it that gives the same bits.
 namespace nephele {
 
 /// Trilinear values: 8 samples per point.
