@@ -70,10 +70,10 @@ struct GriddedCumulo {
 inline constexpr int kMaxMedialSmoothing = 16;
 
 /// Voxel size at which `layers[index]` is sampled for a result of voxel size `resultVoxelSize`: 1/12 of a
-/// wave for the last layer, on which no other builds; for the others 1/16, or down to 1/9, half as many more
-/// samples as the result has voxels to a period of the last layer, so that they add less to its error. Or the
-/// result's voxel where that is coarser, but never over 1/6 of a wave. A wave is 1 / (frequency times detail)
-/// long: a frequency that varies counts with its greatest value.
+/// wave for the last layer, on which no other builds; for the others 1/16, or down to 1/9, one and a half
+/// times the samples that the result has voxels to a period of the last layer, so that they add less to its
+/// error. Or the result's voxel where that is coarser, but never over 1/6 of a wave. A wave is 1 / (frequency
+/// times detail) long: a frequency that varies counts with its greatest value.
 float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index, float resultVoxelSize);
 
 /// Exterior band (world units) in which the base must be a distance for `layers`; the interior one is

@@ -262,7 +262,7 @@ void nearestOf(const GridMap& map, const PointBlock& points, float* values) {
   HWY_ALIGN float samples[kLanes];
   for (int i = 0; i < points.count; i += kLanes) {
     locate(map, detail::kNearestPart, points, i, cells);
-    for (int l = 0; l < kLanes; ++l) samples[l] = float(cells.corner[l][kCorner]);
+    for (int l = 0; l < kLanes; ++l) samples[l] = cells.corner[l][kCorner];
     hn::StoreU(hn::Load(d, samples), d, values + i);
   }
 }

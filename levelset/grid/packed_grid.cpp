@@ -102,7 +102,7 @@ void PackedGrid::encode(std::int32_t pool, const float* samples, const Interval&
 float PackedGrid::at(const Vec3i& voxel) const {
   const std::int32_t pool = poolIndex(brickOf(voxel));
   const Code code = Code::of(ranges()[std::size_t(pool)]);
-  const float value = code.low + code.unit * float(codes(pool)[offsetOf(insideBrick(voxel))]);
+  const float value = code.value(codes(pool)[offsetOf(insideBrick(voxel))]);
   return signless_[std::size_t(pool)] ? std::abs(value) : value;
 }
 
@@ -153,8 +153,7 @@ void PackedGrid::assembleCell(std::size_t place, int first, int begin, int count
     float* target = samples + ((begin + from.z) * kWidth + begin + from.y) * kWidth + begin + from.x;
     for (int z = from.z; z < to.z; ++z, source += kBrick * kBrick, target += kWidth * kWidth)
       for (int y = 0; y < to.y - from.y; ++y)
-        for (int x = 0; x < to.x - from.x; ++x)
-          target[y * kWidth + x] = code.low + code.unit * float(source[y * kBrick + x]);
+        for (int x = 0; x < to.x - from.x; ++x) target[y * kWidth + x] = code.value(source[y * kBrick + x]);
   }
   if (!isSignless) return;
   for (int z = begin; z < begin + count; ++z)

@@ -18,6 +18,7 @@ class PackedGrid : public BrickLayout {
     static constexpr float kLargest = 65535.0f;
     float low, unit;
 
+    float value(std::uint16_t code) const { return low + unit * float(code); }
     static constexpr Code of(const Interval& range) {
       return {range.min, (range.max - range.min) / kLargest};
     }
@@ -45,8 +46,7 @@ class PackedGrid : public BrickLayout {
   float at(const Vec3i& voxel) const;
   std::size_t memoryBytes() const;
 
-  /// Writes the kVolume samples of the brick at a place of the table, with its border. Cost: half a
-  /// microsecond.
+  /// Writes the kVolume samples of the brick at a place of the table, with its border.
   void assemble(std::size_t place, float* samples) const;
   /// Writes those samples of the cell that begins at the stored sample `first` of that brick whose
   /// coordinates are `begin` to `begin + count - 1`, of 0 to 3, along each axis: to where they lie in a
