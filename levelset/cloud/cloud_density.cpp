@@ -238,7 +238,7 @@ CloudLevels cloudLevels(const GriddedCumulo& cloud, float voxelSize, float halfW
   detail::releaseFreed();
   GridBuilder builder(cloud, voxelSize, LevelSetRule(halfWidth), 1.0f);
   const std::vector<Block::Misjudged>& misjudged = builder.keepMisjudged();
-  CloudLevels result{builder.build("levels", progress),
+  CloudLevels result{NarrowBand(builder.build("levels", progress), -halfWidth, halfWidth),
                      VoxelGrid<float>("estimates", double(voxelSize), 0.0f)};
   for (const Block::Misjudged& m : misjudged) {
     const Vec3i brick = brickOf(m.voxel);

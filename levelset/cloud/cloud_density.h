@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "nephele/levelset/cloud/layers_on_grids.h"
+#include "nephele/levelset/grid/narrow_band.h"
 #include "nephele/levelset/grid/voxel_grid.h"
 
 namespace nephele {
@@ -48,7 +49,7 @@ VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize,
 /// layers.
 struct CloudLevels {
   /// l within the half width, which it is beyond: positive inside.
-  VoxelGrid<float> levels;
+  NarrowBand levels;
   /// The estimate of l (see GriddedCumulo) where it is off by more than it says; 0 elsewhere.
   VoxelGrid<float> estimates;
   float halfWidth = 0, estimateError = 0;

@@ -74,10 +74,7 @@ class LevelsToGrid {
   void addBrick(const Vec3i& brick, const Rule& rule, const ScalarField& factor, LevelBlock& block) const {
     const std::int32_t entry = cloud_.levels.entryAt(brick);
     BrickLevels l;
-    if (entry >= 0)
-      std::copy_n(cloud_.levels.samples(entry), l.size(), l.begin());
-    else
-      l.fill(cloud_.levels.constants()[std::size_t(-1 - entry)]);
+    cloud_.levels.read(entry, l.data());
     if (entry < 0 && l[0] <= cloud_.levels.background()) return;
     const Box box = boxOf(brick, 1);
     const Interval range = factor.range(box), band = rule.band(box);

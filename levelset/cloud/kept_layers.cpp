@@ -37,13 +37,13 @@ bool KeptLayers::areLaterAsked(std::span<const CumuloLayer> layers) {
 ScalarField KeptLayers::distance(const std::string& numbers, const std::function<ScalarField()>& make) {
   const std::string key = keys_.shape + kBetween + numbers;
   taken_ = 0;
-  if (!distance_ || distanceKey_ != key) {
+  if (distanceKey_ != key) {
     layers_.clear();
     layerKeys_.clear();
     distance_.reset();
-    distance_ = make();
     distanceKey_ = key;
   }
+  if (!distance_) distance_ = make();
   return *distance_;
 }
 
@@ -74,7 +74,10 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
 void KeptLayers::keep(Layer layer) {
   std::size_t bytes = layer.bytes;
   for (const Layer& before : layers_) bytes += before.bytes;
-  if (wantedIndex_ != layers_.size() || bytes > kMostBytes) return;
+  if (wantedIndex_ != layers_.size() || bytes > kMostBytes) {
+    distance_.reset();
+    return;
+  }
   layers_.push_back(std::move(layer));
   layerKeys_.push_back(std::move(wanted_));
 }

@@ -21,12 +21,13 @@ class PackedGrid;
 /// the surface: here they reach farther, in steps of a quarter of their own height, so that a layer is not
 /// made again for a slightly higher one after it. A few voxels in a million are others than in a cloud
 /// without kept layers. The last layer is not kept, nor are fine ones that would make it all more than
-/// `kMostBytes`: they take the most memory, and changes before them are likelier. Nothing of a cloud without
-/// keys is kept. For one cloud at a time.
+/// `kMostBytes`: they take the most memory, and changes before them are likelier. Where some are not kept,
+/// the distance, which is soon made beside them, is not either. Nothing of a cloud without keys is kept. For
+/// one cloud at a time.
 class KeptLayers {
  public:
   /// Of all layers together.
-  static constexpr std::size_t kMostBytes = std::size_t(64) << 20;
+  static constexpr std::size_t kMostBytes = std::size_t(32) << 20;
 
   /// What the next cloud depends on. Equal keys stand for equal layers.
   struct Keys {
@@ -48,13 +49,14 @@ class KeptLayers {
   static bool areLaterAsked(std::span<const CumuloLayer> layers);
 
   /// The distance that is there under the key of the shape and these numbers, or what `make` returns. Where
-  /// it is made, all layers are let go first.
+  /// they are others than before, all layers are let go first.
   ScalarField distance(const std::string& numbers, const std::function<ScalarField()>& make);
 
-  /// A finished layer, with all that the next one needs.
+  /// A finished layer: its displacement, and the l_i that the next one reads, sampled, or a distance of its
+  /// own where it was turned into one.
   struct Layer {
-    CumuloSampled sampled;
-    std::shared_ptr<PackedGrid> level{};
+    std::shared_ptr<PackedGrid> displacement, level{};
+    std::optional<ScalarField> renormalised{};
     CumuloLayerReport report{};
     /// What it holds.
     std::size_t bytes = 0;

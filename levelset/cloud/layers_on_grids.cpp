@@ -112,21 +112,24 @@ class LayerSampler {
       if (const KeptLayers::Layer* kept = options_.kept->find(step, layers_, numbersOf(step))) {
         level_ = kept->level;
         reports.push_back(kept->report);
-        return kept->sampled;
+        return sampledOf(step, *kept);
       }
     const auto start = std::chrono::steady_clock::now();
     progress_.begin("layer " + std::to_string(step.index + 1));
     const float voxel = cumuloVoxelSize(layers_, step.index, options_.voxelSize);
-    const std::shared_ptr<PackedGrid> grid = bakeLayer(step, voxel);
-
-    const ScalarField displacement = gridField(grid, Interpolation::tricubic);
-    CumuloSampled sampled{displacement, step.before + abs(displacement), 0.0f, 0.0f};
-    prepareNext(step, grid, sampled);
+    KeptLayers::Layer layer{.displacement = bakeLayer(step, voxel)};
+    if (step.index + 1 < layers_.size())
+      prepareNext(step, layer);
+    else
+      prepareEstimate(step, layer.displacement);
     reports.back().seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     progress_.count("active_voxels", double(reports.back().activeVoxels));
-    if (isKept)
-      options_.kept->keep(
-          {sampled, level_, reports.back(), grid->memoryBytes() + (level_ ? level_->memoryBytes() : 0)});
+    const CumuloSampled sampled = sampledOf(step, layer);
+    if (isKept) {
+      layer.report = reports.back();
+      layer.bytes = layer.displacement->memoryBytes() + (layer.level ? layer.level->memoryBytes() : 0);
+      options_.kept->keep(std::move(layer));
+    }
     return sampled;
   }
 
@@ -142,6 +145,18 @@ class LayerSampler {
                        marginOf(layers_, step.index + 1, options_), options_.newtonSteps,
                        options_.medialSmoothing) +
            fmt::format(" {}", int(options_.renormalise));
+  }
+
+  static CumuloSampled sampledOf(const CumuloStep& step, const KeptLayers::Layer& layer) {
+    const ScalarField displacement = gridField(layer.displacement, Interpolation::tricubic);
+    if (layer.renormalised)
+      return {displacement, *layer.renormalised, *layer.renormalised, *layer.renormalised};
+    CumuloSampled sampled{displacement, step.before + abs(displacement), 0.0f, 0.0f};
+    if (!layer.level) return sampled;
+    // At the grid's own voxels trilinear interpolation gives the samples.
+    sampled.level = gridField(layer.level);
+    sampled.surface = gridField(layer.level, Interpolation::tricubic);
+    return sampled;
   }
 
   /// The layer's grid, packed. A large one is made in parts along z, since samples take more memory until
@@ -211,14 +226,15 @@ class LayerSampler {
     return std::max(kLeastDilation, int(std::ceil(voxels)));
   }
 
-  /// l_i for the next layer to find its surface points on; after the last layer the estimate of the result.
-  void prepareNext(const CumuloStep& step, const std::shared_ptr<PackedGrid>& grid, CumuloSampled& sampled) {
-    const float voxel = grid->voxelSize();
-    if (step.index + 1 == layers_.size()) {
-      estimate = (level_ ? withRangesOf(*level_, step.before) : step.before) + abs(gridField(grid));
-      estimateVoxelSize = voxel;
-      return;
-    }
+  /// After the last layer the estimate of the result.
+  void prepareEstimate(const CumuloStep& step, const std::shared_ptr<PackedGrid>& grid) {
+    estimate = (level_ ? withRangesOf(*level_, step.before) : step.before) + abs(gridField(grid));
+    estimateVoxelSize = grid->voxelSize();
+  }
+
+  /// l_i for the next layer to find its surface points on.
+  void prepareNext(const CumuloStep& step, KeptLayers::Layer& layer) {
+    const float voxel = layer.displacement->voxelSize();
     const float margin = marginOf(layers_, step.index + 1, options_);
     const float further = step.reach - step.bound;
     BakeOptions spec{.voxelSize = voxel,
@@ -229,16 +245,14 @@ class LayerSampler {
       const bool exact = options_.renormalise == CumuloGridOptions::Renormalise::rebuild;
       const DistanceBand band{.exterior = further + 2 * margin, .interior = 2 * margin};
       spec.voxelSize = std::max(options_.voxelSize, voxel / 2);
-      sampled.sum = exact ? rebuiltDistance(sampled.sum, spec, band, progress_)
-                          : sweptDistance(sampled.sum, spec, band, progress_);
-      sampled.surface = sampled.level = sampled.sum;
+      const ScalarField sum = step.before + abs(gridField(layer.displacement, Interpolation::tricubic));
+      layer.renormalised =
+          exact ? rebuiltDistance(sum, spec, band, progress_) : sweptDistance(sum, spec, band, progress_);
       return;
     }
-    // At the grid's own voxels trilinear interpolation gives the samples.
-    level_ = detail::packed(detail::bakeSamples(detail::grownLevel(step.before, step.level, gridField(grid)),
-                                                spec, SubProgress(progress_, kShareOfBake, 1)));
-    sampled.level = gridField(level_);
-    sampled.surface = gridField(level_, Interpolation::tricubic);
+    const ScalarField level = detail::grownLevel(step.before, step.level, gridField(layer.displacement));
+    level_ = detail::packed(detail::bakeSamples(level, spec, SubProgress(progress_, kShareOfBake, 1)));
+    layer.level = level_;
   }
 
   /// The samples of one brick. Where the displacement is 0 the layer was not evaluated.

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "nephele/levelset/io/vdb_io.h"
@@ -63,8 +64,8 @@ std::uint64_t digestOf(const VoxelGrid<float>& grid) {
   return sum;
 }
 
-std::string digestOf(const CloudLevels& levels) {
-  return fmt::format("{:016x}{:016x}", digestOf(levels.levels), digestOf(levels.estimates));
+std::string digestOf(const VoxelGrid<float>& surface, const VoxelGrid<float>& estimates) {
+  return fmt::format("{:016x}{:016x}", digestOf(surface), digestOf(estimates));
 }
 
 /// What a file takes is given back to nobody.
@@ -79,14 +80,14 @@ VoxelGrid<float> copyOf(const VoxelGrid<float>& grid) {
   return copy;
 }
 
-json labelOf(const std::string& key, const CloudLevels& levels) {
+json labelOf(const std::string& key, const CloudLevels& levels, const VoxelGrid<float>& surface) {
   json layers = json::array();
   for (const CumuloLayerReport& r : levels.layers)
     layers.push_back(
         {r.amplitude, r.frequency, r.voxelSize, r.activeVoxels, r.unconvergedFraction, r.meanDisplacement});
   const Box& b = levels.box;
   return {{"key", key},
-          {"digest", digestOf(levels)},
+          {"digest", digestOf(surface, levels.estimates)},
           {"voxel_size", levels.levels.voxelSize()},
           {"half_width", levels.halfWidth},
           {"estimate_error", levels.estimateError},
@@ -104,10 +105,14 @@ CloudLevels levelsFrom(const std::string& path, const std::string& key) {
   require(surface != grids.end(), "it has no levels");
   const json label = json::parse(metadataOf(*surface, kLabel).value_or("{}"));
   require(label.value("key", "") == key, "it holds something else");
-  const double voxelSize = label.at("voxel_size");
-  CloudLevels levels{toVoxels(*toBricks(*surface)), VoxelGrid<float>("estimates", voxelSize, 0.0f)};
-  if (estimate != grids.end()) levels.estimates = toVoxels(*toBricks(*estimate));
-  levels.halfWidth = label.at("half_width");
+  const float halfWidth = label.at("half_width");
+  VoxelGrid<float> voxels = toVoxels(*toBricks(*surface));
+  VoxelGrid<float> estimates =
+      estimate != grids.end() ? toVoxels(*toBricks(*estimate))
+                              : VoxelGrid<float>("estimates", label.at("voxel_size").get<double>(), 0.0f);
+  require(digestOf(voxels, estimates) == label.at("digest").get<std::string>(), "it is damaged");
+  CloudLevels levels{NarrowBand(std::move(voxels), -halfWidth, halfWidth), std::move(estimates)};
+  levels.halfWidth = halfWidth;
   levels.estimateError = label.at("estimate_error");
   const auto box = label.at("box").get<std::array<float, 6>>();
   levels.box = {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
@@ -118,7 +123,6 @@ CloudLevels levelsFrom(const std::string& path, const std::string& key) {
                              .activeVoxels = r.at(3),
                              .unconvergedFraction = r.at(4),
                              .meanDisplacement = r.at(5)});
-  require(digestOf(levels) == label.at("digest").get<std::string>(), "it is damaged");
   return levels;
 }
 
@@ -165,10 +169,11 @@ bool LevelCache::write(const std::string& key, const CloudLevels& levels, const 
     std::error_code error;
     fs::create_directories(options_.folder, error);
     require(!error, fmt::format("the folder {} cannot be made: {}", options_.folder, error.message()));
+    VoxelGrid<float> surface = levels.levels.voxels();
+    const std::string label = labelOf(key, levels, surface).dump();
     std::vector<VdbGrid> grids{
-        toVdb(copyOf(levels.levels), {.name = kLevels,
-                                      .gridClass = VdbGridInfo::Class::levelSet,
-                                      .metadata = {{kLabel, labelOf(key, levels).dump()}}})};
+        toVdb(std::move(surface),
+              {.name = kLevels, .gridClass = VdbGridInfo::Class::levelSet, .metadata = {{kLabel, label}}})};
     if (levels.estimates.sampledBricks() > 0)
       grids.push_back(toVdb(copyOf(levels.estimates), {.name = kEstimates}));
     writeVdbFile(path, grids, {{"creator", "nephele"}});

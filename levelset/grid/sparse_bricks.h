@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -54,7 +55,8 @@ class SparseBricks {
   const BrickTable& table() const { return table_; }
   /// Bytes held.
   std::size_t memoryBytes() const {
-    return table_.memoryBytes() + samples_.size() * kTogether * samplesPerBrick_ * sizeof(Sample);
+    const auto held = std::ranges::count_if(samples_, [](const auto& samples) { return bool(samples); });
+    return table_.memoryBytes() + std::size_t(held) * kTogether * samplesPerBrick_ * sizeof(Sample);
   }
 
  private:

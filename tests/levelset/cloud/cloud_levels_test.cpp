@@ -118,7 +118,7 @@ TEST_F(LevelCacheFiles, HoldWhatWasKept) {
   ASSERT_TRUE(cache().write(key_, levels));
   const auto read = cache().read(key_);
   ASSERT_TRUE(read);
-  EXPECT_TRUE(bricksOf(read->levels) == bricksOf(levels.levels));
+  EXPECT_TRUE(bricksOf(read->levels.voxels()) == bricksOf(levels.levels.voxels()));
   EXPECT_TRUE(bricksOf(read->estimates) == bricksOf(levels.estimates));
   EXPECT_EQ(read->halfWidth, levels.halfWidth);
   EXPECT_EQ(read->estimateError, levels.estimateError);
@@ -186,7 +186,7 @@ TEST_F(LevelCacheFiles, ThatCannotBeWrittenStopNothing) {
 
 TEST_F(LevelCacheFiles, MayBeWrittenAndReadAtOnce) {
   const CloudLevels levels = made();
-  const Bricks expected = bricksOf(levels.levels);
+  const Bricks expected = bricksOf(levels.levels.voxels());
   std::vector<std::thread> threads;
   for (int i = 0; i < 4; ++i)
     threads.emplace_back([&] {
@@ -195,7 +195,7 @@ TEST_F(LevelCacheFiles, MayBeWrittenAndReadAtOnce) {
         EXPECT_TRUE(cache().write(key_, levels, notes));
         const auto read = cache().read(key_, notes);
         ASSERT_TRUE(read);
-        EXPECT_TRUE(bricksOf(read->levels) == expected);
+        EXPECT_TRUE(bricksOf(read->levels.voxels()) == expected);
         EXPECT_TRUE(notes.all.empty());
       }
     });

@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "nephele/levelset/grid/narrow_band.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/brick_grids.h"
@@ -42,6 +48,47 @@ TEST(VoxelGrid, BrickThatBecomesConstantForgetsItsSamples) {
   EXPECT_EQ(toBricks(grid)->at({3, 4, 5}), 0.5f);
   // Its place is still held, but must not be written.
   EXPECT_EQ(describe(toVdb(std::move(grid), {"a"})).activeVoxels, 512u);
+}
+
+TEST(NarrowBand, HoldsEveryBitInLessMemory) {
+  constexpr float kEnd = 0.25f;
+  VoxelGrid<float> grid("test", 0.5, -kEnd), same("test", 0.5, -kEnd);
+  for (VoxelGrid<float>* g : {&grid, &same}) g->setConstant({-3, 0, 1}, kEnd);
+  for (int b = 0; b < 1100; ++b) {
+    const Vec3i brick{b % 11 - 5, b / 11 % 10, b / 110 + 4};
+    float* values = grid.add(brick);
+    for (int i = 0; i < kBrickSamples; ++i)
+      values[i] = std::clamp(0.2f * (scatter({i, b, 0}) - 3), -kEnd, kEnd);
+    // What is not between the ends, or is nearly one of them.
+    values[3] = 7;
+    values[4] = -0.0f;
+    values[5] = std::nextafter(kEnd, 0.0f);
+    std::copy_n(values, kBrickSamples, same.add(brick));
+  }
+  const std::size_t before = same.memoryBytes();
+  const NarrowBand band(std::move(grid), -kEnd, kEnd);
+  // A quarter of the values lie between; two bits for each, and the table, are the rest.
+  EXPECT_LT(band.memoryBytes(), before / 2);
+  EXPECT_EQ(band.background(), -kEnd);
+  EXPECT_EQ(band.voxelSize(), 0.5);
+  const VoxelGrid<float> back = band.voxels();
+  int bricks = 0, equal = 0;
+  same.forEachBrick([&](const Vec3i& brick, std::int32_t entry) {
+    ++bricks;
+    std::array<float, kBrickSamples> read;
+    band.read(band.entryAt(brick), read.data());
+    if (entry < 0) {
+      EXPECT_EQ(read[17], kEnd);
+      EXPECT_LT(back.entryAt(brick), 0);
+      return;
+    }
+    const auto holds = [&](const float* values) {
+      return std::memcmp(values, same.samples(entry), sizeof read) == 0;
+    };
+    equal += holds(read.data()) && holds(back.samples(back.entryAt(brick)));
+  });
+  EXPECT_EQ(bricks, 1101);
+  EXPECT_EQ(equal, 1100);
 }
 
 TEST(VoxelGrid, BricksReadTheirNeighboursWhereTheyVary) {
