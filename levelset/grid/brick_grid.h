@@ -50,9 +50,16 @@ class BrickGrid : public BrickLayout {
   detail::UnsetVector<float> values_;
 };
 
-/// Told of the bricks begin .. end - 1 of a grid when they are made, each once and in their order; it may
-/// give back their samples. The pool is complete then, the table is not.
-using BrickSink = std::function<void(BrickGrid& grid, std::int32_t begin, std::int32_t end)>;
+/// Takes the samples of bricks while a grid is made, in place of the grid: that reads as 0 then, but has its
+/// ranges and its layout.
+struct BrickSink {
+  /// Told first how many bricks the pool has, and at how many places of the table they stand.
+  std::function<void(std::size_t bricks, std::size_t places)> begin;
+  /// Given the kVolume samples of each brick of the pool once, from several threads.
+  std::function<void(std::int32_t pool, const float* samples)> take;
+
+  explicit operator bool() const { return bool(take); }
+};
 
 /// Copies the shared border samples of all bricks from their neighbours' own samples and recomputes the
 /// ranges. Call after writing the 8^3 own samples of pool bricks that each stand at one position. Shared

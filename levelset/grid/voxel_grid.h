@@ -97,8 +97,8 @@ enum class Beside {
   constant,  ///< It stays constant: for grids that hold all bricks that matter, in less memory.
 };
 
-/// The values of `grid`, ready to be interpolated: 2.6 times the memory of its samples, unless `made` gives
-/// them back. All cores.
+/// The values of `grid`, ready to be interpolated: 2.6 times the memory of its samples, unless `made` takes
+/// them. All cores.
 /// @throws Error if the box of its bricks is too large to hold.
 std::shared_ptr<BrickGrid> toBricks(const VoxelGrid<float>& grid, Beside beside = Beside::varying,
                                     const BrickSink& made = {});

@@ -126,6 +126,9 @@ void writePng(const std::string& path, const Image& image, const ViewTransform& 
     png_set_IHDR(writer.png, writer.info, png_uint_32(image.width), png_uint_32(image.height), 8,
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
+    // Pictures of clouds become as small as by libpng's defaults, in half the time.
+    png_set_filter(writer.png, PNG_FILTER_TYPE_DEFAULT, PNG_FILTER_SUB);
+    png_set_compression_level(writer.png, 4);
     if (!view.configView && view.curve == ViewCurve::raw)
       png_set_gAMA(writer.png, writer.info, 1.0);
     else if (!view.configView)

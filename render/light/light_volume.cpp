@@ -31,6 +31,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -224,13 +225,16 @@ LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const
   if (volume.isEmpty()) return;
 
   makeRoom(findBricks(volume, sweep), options.coded);
+  std::atomic<std::int32_t> coded = dark_ < INFINITY ? 2 : 1;
   parallelFor(
       std::size_t(brickCount_.x) * brickCount_.y, 4,
       [&](std::size_t begin, std::size_t end) {
-        for (std::size_t column = begin; column != end; ++column) fillColumn(sweep, column);
+        for (std::size_t column = begin; column != end; ++column) fillColumn(sweep, column, coded);
       },
       progress);
-  if (options.coded) coded_.setTable(table_);
+  if (!options.coded) return;
+  coded_.keepFirst(std::size_t(coded));
+  coded_.setTable(table_);
 }
 
 // Numbers the bricks of the lattice that a density brick reaches: along the light just its own, across as far
@@ -309,26 +313,32 @@ void LightVolume::findDark(const Sweep& sweep) {
   });
 }
 
-// Sums the density down one column of bricks, from the light on.
-void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
+// Sums the density down one column of bricks, from the light on. Bricks that are coded get their numbers only
+// here, so that those of one value, before all density and in the dark behind it, take no memory.
+void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic<std::int32_t>& coded) {
   const std::size_t across = std::size_t(brickCount_.x) * brickCount_.y;
   const int u0 = (firstBrick_.x + int(column % std::size_t(brickCount_.x))) * kBrick;
   const int v0 = (firstBrick_.y + int(column / std::size_t(brickCount_.x))) * kBrick;
   const int down = sweep.fromAbove ? -1 : 1;
-  const auto poolAt = [&](int n) {
-    const std::int32_t pool =
-        table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
-    return isStored(pool) ? pool : 0;
+  const auto entryAt = [&](int n) -> std::int32_t& {
+    return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
   };
+  const auto poolAt = [&](int n) { return isStored(entryAt(n)) ? entryAt(n) : 0; };
   // Nodes of the brick that is being worked out, before they are coded.
   std::array<float, kVolume> own;
-  const auto store = [&](std::int32_t pool, int inside, const detail::SliceNodes& sum,
-                         const detail::Slices& at) {
-    float* nodes = values_.empty() ? own.data() : values_.data() + std::size_t(pool) * kVolume;
+  bool isDark = false;
+  const auto codeOwn = [&](std::int32_t& entry) {
+    const auto [least, most] = std::ranges::minmax(own);
+    isDark = least > dark_;
+    entry = isDark ? 1 : least == 0 && most == 0 ? 0 : coded++;
+    if (isStored(entry)) coded_.set(entry, own.data());
+  };
+  const auto store = [&](int brick, int inside, const detail::SliceNodes& sum, const detail::Slices& at) {
+    float* nodes = values_.empty() ? own.data() : values_.data() + std::size_t(poolAt(brick)) * kVolume;
     nodes += (sweep.fromAbove ? kBrick - inside : inside) * kWidth * kWidth;
     // Less the mean error of interpolation along the light.
     detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, nodes);
-    if (inside == kBrick && values_.empty()) coded_.set(pool, own.data());
+    if (inside == kBrick && values_.empty()) codeOwn(entryAt(brick));
   };
   detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
   detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
@@ -343,7 +353,9 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
     at.previous->fill(0.0f);
     sweep.load(u0, v0, k, *here);
     sweep.interpolate(*here, u0, v0, float(k), *at.density);
-    for (int slice = 0; slice <= slices; ++slice, k += down) {
+    // Behind a dark brick all is dark.
+    int finished = n;
+    for (int slice = 0; slice <= slices && !isDark; ++slice, k += down) {
       // What the way to the next slice adds.
       if (slice < slices && (sweep.load(u0, v0, k + down, *next) || !here->isEmpty())) {
         const float middle = float(k) + 0.5f * float(down);
@@ -357,14 +369,18 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column) {
         at.next->fill(0.0f);
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
-      if (slice > 0 && inside == 0) store(poolAt(brick - 1), kBrick, sum, at);
-      if (slice < slices) store(poolAt(brick), inside, sum, at);
+      if (slice > 0 && inside == 0) {
+        store(brick - 1, kBrick, sum, at);
+        finished = brick;
+      }
+      if (slice < slices) store(brick, inside, sum, at);
       detail::addSlice(*at.after, sum);
       std::swap(at.before, at.after);
       std::swap(at.previous, at.density);
       std::swap(at.density, at.next);
       std::swap(here, next);
     }
+    for (; isDark && finished < end; ++finished) entryAt(finished) = 1;
   });
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -35,7 +36,7 @@ class LightVolume {
 
   struct Options {
     /// Columns beyond this need not be told apart: no light is left there. Bricks that lie wholly beyond it
-    /// are not worked out, and hold this everywhere.
+    /// hold this everywhere, and most are not worked out.
     float dark = std::numeric_limits<float>::infinity();
     /// Codes bricks as they are worked out, in half the memory. Neither `replace` nor `addShade` may follow.
     bool coded = false;
@@ -96,7 +97,7 @@ class LightVolume {
 
   std::int32_t findBricks(const RenderVolume& volume, const Sweep& sweep);
   void findDark(const Sweep& sweep);
-  void fillColumn(const Sweep& sweep, std::size_t column);
+  void fillColumn(const Sweep& sweep, std::size_t column, std::atomic<std::int32_t>& coded);
   void makeRoom(std::int32_t bricks, bool coded);
   bool isStored(std::int32_t pool) const { return pool > (dark_ < INFINITY ? 1 : 0); }
 

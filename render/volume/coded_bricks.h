@@ -51,6 +51,8 @@ class CodedBricks {
   /// Codes kWidth^3 numbers, of which rows begin `row` and planes row^2 apart. From several threads for
   /// different bricks.
   void set(std::int32_t pool, const float* nodes, int row = kWidth);
+  /// Gives up all but the first bricks of the pool, which never take memory if they were not set.
+  void keepFirst(std::size_t bricks) { units_.resize(bricks); }
   /// Lets bricks stand at places.
   void setTable(std::span<const std::int32_t> table);
 

@@ -85,9 +85,6 @@ HWY_AFTER_NAMESPACE();
 
 #include <utility>
 
-#include "nephele/levelset/grid/large_buffer.h"
-#include "nephele/modeling/base/parallel.h"
-
 namespace nephele {
 
 HWY_EXPORT(measuresOf);
@@ -96,18 +93,19 @@ BrickMeasures BrickMeasures::of(const float* brick) {
   return HWY_DYNAMIC_DISPATCH(measuresOf)(brick);
 }
 
-void CodedDensity::take(BrickGrid& grid, std::int32_t begin, std::int32_t end) {
-  if (measures_.empty()) {
-    measures_.resize(grid.poolSize());
-    codes_ = CodedBricks(grid.poolSize());
-  }
-  parallelFor(std::size_t(end - begin), 16, [&](std::size_t first, std::size_t last) {
-    for (std::int32_t pool = begin + std::int32_t(first); pool != begin + std::int32_t(last); ++pool) {
-      measures_[std::size_t(pool)] = BrickMeasures::of(grid.brick(pool));
-      codes_.set(pool, grid.brick(pool) + sampleOffset(0, 0, 0), BrickGrid::kWidth);
-    }
-  });
-  detail::releasePages(grid.brick(begin), grid.brick(end));
+void CodedDensity::begin(std::size_t bricks) {
+  measures_.resize(bricks);
+  codes_ = CodedBricks(bricks);
+}
+
+void CodedDensity::take(std::int32_t pool, const float* samples) {
+  measures_[std::size_t(pool)] = BrickMeasures::of(samples);
+  codes_.set(pool, samples + sampleOffset(0, 0, 0), BrickGrid::kWidth);
+}
+
+BrickSink CodedDensity::sink() {
+  return {[this](std::size_t bricks, std::size_t) { begin(bricks); },
+          [this](std::int32_t pool, const float* samples) { take(pool, samples); }};
 }
 
 CodedBricks CodedDensity::codes(const BrickGrid& grid) {

@@ -23,9 +23,12 @@ struct BrickMeasures {
 /// A density that is coded brick by brick while it is read, so that its samples are never held all at once.
 class CodedDensity {
  public:
-  /// Codes the bricks begin .. end - 1 and gives the memory of their samples back: a BrickSink. Uses all
-  /// cores.
-  void take(BrickGrid& grid, std::int32_t begin, std::int32_t end);
+  /// Room for a pool of so many bricks. @throws Error as CodedBricks.
+  void begin(std::size_t bricks);
+  /// Codes the kVolume samples of a brick; see BrickSink.
+  void take(std::int32_t pool, const float* samples);
+  /// All of this as such.
+  BrickSink sink();
 
   const std::vector<BrickMeasures>& measures() const { return measures_; }
   /// Those of a grid all of whose bricks were taken; only once.

@@ -217,6 +217,7 @@ void RenderVolume::measureBounds(const CodedDensity* coded) {
       if (!box.isEmpty()) boxes[i] = box.expanded(1.0f);
     }
   });
+  outline_.reserve(8 * boxes.size());
   for (const Box& box : boxes) {
     if (box.isEmpty()) continue;
     for (int corner = 0; corner != 8; ++corner) {

@@ -84,12 +84,12 @@ VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& densi
 BrickSink codingOf(VolumePart& part, const VolumeOptions& options, const VolumeReading& reading, Run& run) {
   if (!reading.coded || part.share != 1 || options.hasOthers()) return {};
   part.coded = std::make_shared<CodedDensity>();
-  return [coded = part.coded, &run](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
-    if (begin == 0)
-      run.requireMemory(CodedBricks::estimateBytes(double(grid.poolSize()), double(grid.places().size())),
-                        "make the volume with larger voxels");
-    coded->take(grid, begin, end);
-  };
+  return {[coded = part.coded, &run](std::size_t bricks, std::size_t places) {
+            run.requireMemory(CodedBricks::estimateBytes(double(bricks), double(places)),
+                              "make the volume with larger voxels");
+            coded->begin(bricks);
+          },
+          [coded = part.coded](std::int32_t pool, const float* samples) { coded->take(pool, samples); }};
 }
 
 VolumePart readPart(const std::string& path, std::size_t index, const VolumeOptions& options,

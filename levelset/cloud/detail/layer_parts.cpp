@@ -12,8 +12,8 @@ namespace {
 
 /// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
 /// copy less from their neighbours.
-constexpr int kPartBricks = 8;
-constexpr double kPartPositions = 1 << 17;
+constexpr int kPartBricks = 6;
+constexpr double kPartPositions = 1 << 15;
 
 }  // namespace
 

@@ -134,7 +134,12 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
   result->reserve(pool);
   for (std::size_t c = 1; c < constants.size(); ++c) result->appendConstant(blocks.sign * constants[c]);
   result->appendUnset(rowStart[rowCount]);
-  const auto gatherRows = [&](std::size_t begin, std::size_t end) {
+  if (made) {
+    made.begin(pool, table.size());
+    for (std::int32_t c = 0; c < std::int32_t(constants.size()); ++c) made.take(c, result->brick(c));
+  }
+  parallelFor(rowCount, 4, [&](std::size_t begin, std::size_t end) {
+    std::array<float, BrickGrid::kVolume> passed;
     for (std::size_t row = begin; row < end; ++row) {
       if (rowStart[row + 1] == rowStart[row]) continue;
       auto next = std::int32_t(constants.size() + rowStart[row]);
@@ -142,24 +147,14 @@ std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice&
         std::int32_t& entry = table[row * rowLength + x];
         if (entry != kSampled) continue;
         entry = next++;
-        float* samples = result->brick(entry);
+        float* samples = made ? passed.data() : result->brick(entry);
         gather(blocks, firstOfRow(row) + Vec3i{int(x), 0, 0}, samples);
         requireFinite(samples, BrickGrid::kVolume, name);
         result->setRange(entry, rangeOfBrick(samples));
+        if (made) made.take(entry, samples);
       }
     }
-  };
-  if (made) made(*result, 0, std::int32_t(constants.size()));
-  constexpr std::uint32_t kTogether = 8192;
-  for (std::size_t first = 0, last = 0; first != rowCount; first = last) {
-    while (last != rowCount && (!made || last == first || rowStart[last + 1] - rowStart[first] <= kTogether))
-      ++last;
-    parallelFor(last - first, 4,
-                [&](std::size_t begin, std::size_t end) { gatherRows(first + begin, first + end); });
-    if (made)
-      made(*result, std::int32_t(constants.size() + rowStart[first]),
-           std::int32_t(constants.size() + rowStart[last]));
-  }
+  });
   result->setTable(std::move(table));
   return result;
 }

@@ -31,8 +31,8 @@ struct BlockTable {
 /// @throws Error, naming the grid, if one of the samples is not finite.
 void requireFinite(const float* samples, int count, const std::string& name);
 
-/// Bricks with borders, `made` being told of them. Uses all cores; the result does not depend on their
-/// number.
+/// Bricks with borders, whose samples `made` takes if it is there. Uses all cores; the result does not depend
+/// on their number.
 /// @throws Error, naming the grid, if a value is not finite or there are more bricks than can be numbered.
 std::shared_ptr<BrickGrid> gatherBricks(const BlockTable& blocks, const Lattice& lattice, Beside beside,
                                         const std::string& name, const BrickSink& made = {});

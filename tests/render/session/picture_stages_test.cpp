@@ -224,7 +224,7 @@ TEST(PictureStages, KeepLayersBeforeThatWhichChanges) {
     PictureStages fresh;
     const auto wanted = levels(fresh, amplitude, last, roughness);
     EXPECT_EQ(fresh.layersTaken(), 0u);
-    EXPECT_EQ(samplesOf(found.levels), samplesOf(wanted->levels));
+    EXPECT_EQ(samplesOf(found.levels.voxels()), samplesOf(wanted->levels.voxels()));
     EXPECT_EQ(found.layers.size(), 3u);
   };
   levels(stages, 0.03f, 0.0085f);
@@ -262,7 +262,8 @@ TEST(PictureStages, KeepLayersWhoseAmplitudesVary) {
       const auto result = stages.levels(key, options, {"", "", key});
       PictureStages fresh;
       fresh.shape("humilis", [] { return cloudShapeMesh({}); });
-      EXPECT_EQ(samplesOf(result->levels), samplesOf(fresh.levels(key, options, {"", "", key})->levels));
+      EXPECT_EQ(samplesOf(result->levels.voxels()),
+                samplesOf(fresh.levels(key, options, {"", "", key})->levels.voxels()));
     };
     levels(0.0085f);
     levels(0.009f);

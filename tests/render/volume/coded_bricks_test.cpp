@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -153,28 +154,31 @@ VdbGrid fog() {
   return toVdb(*grid, {"density", VdbGridInfo::Class::fogVolume});
 }
 
-TEST(CodedDensity, IsToldOfEveryBrickOnceAndInOrder) {
+TEST(CodedDensity, IsGivenTheSamplesOfEveryBrickOnce) {
   const VdbGrid vdb = fog();
   const auto whole = toBricks(vdb);
-  std::int32_t next = 0;
-  std::vector<float> samples;
-  const auto told = toBricks(vdb, [&](BrickGrid& grid, std::int32_t begin, std::int32_t end) {
-    EXPECT_EQ(begin, next);
-    EXPECT_EQ(grid.poolSize(), whole->poolSize());
-    next = end;
-    samples.insert(samples.end(), grid.brick(begin), grid.brick(end));
-  });
-  EXPECT_EQ(std::size_t(next), whole->poolSize());
-  EXPECT_TRUE(std::equal(samples.begin(), samples.end(), whole->values().begin(), whole->values().end()));
+  std::vector<std::atomic<int>> times(whole->poolSize());
+  std::atomic<int> other = 0;
+  const auto told =
+      toBricks(vdb, {[&](std::size_t bricks, std::size_t places) {
+                       EXPECT_EQ(bricks, whole->poolSize());
+                       EXPECT_EQ(places, whole->table().size());
+                     },
+                     [&](std::int32_t pool, const float* samples) {
+                       ++times[std::size_t(pool)];
+                       other += !std::equal(samples, samples + BrickGrid::kVolume, whole->brick(pool));
+                     }});
+  EXPECT_TRUE(std::ranges::all_of(times, [](int count) { return count == 1; }));
+  EXPECT_EQ(other, 0);
   EXPECT_EQ(told->table(), whole->table());
+  EXPECT_EQ(told->ranges(), whole->ranges());
 }
 
 TEST(CodedDensity, KnowsWhatTheSamplesTell) {
   const VdbGrid vdb = fog();
   const RenderVolume all(toBricks(vdb));
   CodedDensity coded;
-  const auto grid = toBricks(
-      vdb, [&](BrickGrid& bricks, std::int32_t begin, std::int32_t end) { coded.take(bricks, begin, end); });
+  const auto grid = toBricks(vdb, coded.sink());
   const RenderVolume volume(grid, std::move(coded));
   EXPECT_FALSE(volume.hasSamples());
   EXPECT_LT(volume.memoryBytes(), all.memoryBytes() - all.density().values().size() * 3);
