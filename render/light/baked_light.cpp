@@ -28,8 +28,8 @@ float largestMoment(const Phase& phase) {
 }  // namespace
 
 BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
-                       const Octaves& itsOctaves, std::shared_ptr<const SkyPart>& before,
-                       const Progress& progress, const Surfaces* surfaces)
+                       const Octaves& itsOctaves, const SkyPart* before, const Progress& progress,
+                       const Surfaces* surfaces)
     : source(&volume),
       medium(itsMedium),
       lights(itsLights),
@@ -230,7 +230,7 @@ void BakedLight::setColours(const RenderVolume& volume, float most) {
 
 // Sets what light does after its first scattering; the sky's part is that of `before` where skies are
 // equal.
-void BakedLight::scatter(std::shared_ptr<const SkyPart>& before, const Progress& progress) {
+void BakedLight::scatter(const SkyPart* before, const Progress& progress) {
   const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3;
   const bool once = octaves.count == 1;
   forward = once ? ForwardLight(medium.phase)
@@ -254,7 +254,6 @@ void BakedLight::scatter(std::shared_ptr<const SkyPart>& before, const Progress&
   scene.skyParts = int(skies.size());
   const bool isSkyAsBefore = before && before->radiance == lights.sky && before->map == sky &&
                              before->parts == scene.skyParts && before->colours == scene.colours;
-  if (!isSkyAsBefore) before.reset();
   for (std::size_t part = 0; part != skies.size(); ++part) {
     from.emplace_back();
     const int colour = colours == 1 ? 0 : int(part), like = sky ? colour : colourLike(colour, {1, 1, 1});
