@@ -139,13 +139,20 @@ struct LightVolume::Sweep {
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
           const std::uint16_t* from = coded->codes() + entry.first + first;
-          copyRows(countU, countV, rows, [&](int x, int y) {
-            return (float(from[x * sampleStride[u] + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
-          });
+          const auto sampleAt = [&](int x, int y) {
+            return (float(from[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
+          };
+          if (u == 0)
+            copyRows(countU, countV, rows, sampleAt);
+          else
+            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
         } else {
           const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
-          copyRows(countU, countV, rows,
-                   [&](int x, int y) { return from[x * sampleStride[u] + y * sampleStride[v]]; });
+          const auto sampleAt = [&](int x, int y) { return from[x + y * sampleStride[v]]; };
+          if (u == 0)
+            copyRows(countU, countV, rows, sampleAt);
+          else
+            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
         }
         u1 = u2;
       }
@@ -328,9 +335,9 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic
   std::array<float, kVolume> own;
   bool isDark = false;
   const auto codeOwn = [&](std::int32_t& entry) {
-    const auto [least, most] = std::ranges::minmax(own);
-    isDark = least > dark_;
-    entry = isDark ? 1 : least == 0 && most == 0 ? 0 : coded++;
+    const Interval range = rangeOfSamples(own);
+    isDark = range.min > dark_;
+    entry = isDark ? 1 : range == Interval::of(0) ? 0 : coded++;
     if (isStored(entry)) coded_.set(entry, own.data());
   };
   const auto store = [&](int brick, int inside, const detail::SliceNodes& sum, const detail::Slices& at) {

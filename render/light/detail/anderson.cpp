@@ -49,22 +49,35 @@ float Anderson::step(Moments& x, const Moments& g) {
   lastF_.resize(n);
   resizeLarge(lastG_, x.size());
   std::vector<std::array<double, 2>> changes(pieces.size());
+  static_assert(kMemory == 1);
+  const float by = m > 0 ? float(share[0]) : 0.0f;
+  // A vector of values.
+  const auto move = [&, moved = x.data(), last = lastG_.data(), grown = m > 0 ? dg_[0].data() : nullptr,
+                     given = g.data()](std::size_t first) {
+    for (std::size_t i = first; i != first + CellRows::kVector; ++i) {
+      float next = given[i];
+      if (!isFirst) {
+        grown[i] = given[i] - last[i];
+        next -= by * grown[i];
+      }
+      last[i] = given[i];
+      moved[i] = next;
+    }
+  };
   parallelFor(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p != end; ++p) {
       std::array<double, 2>& sums = changes[p];
-      for (std::size_t cell = p * piece; cell != std::min(n, (p + 1) * piece); cell += CellRows::kVector)
-        for (std::size_t k = 0, i = cell * values_; k != CellRows::kVector * values_; ++k, ++i) {
-          if (!isFirst) dg_[m - 1][i] = g[i] - lastG_[i];
-          float next = g[i];
-          for (std::size_t r = 0; r != m; ++r) next -= float(share[r]) * dg_[r][i];
-          lastG_[i] = g[i];
-          if (k < CellRows::kVector) {
-            lastF_[cell + k] = g[i] - x[i];
-            sums[0] += double(weights_[cell + k] * std::fabs(next - x[i]));
-            sums[1] += double(weights_[cell + k] * std::fabs(next));
-          }
-          x[i] = next;
+      for (std::size_t cell = p * piece; cell != std::min(n, (p + 1) * piece); cell += CellRows::kVector) {
+        const std::size_t first = cell * values_;
+        std::array<float, CellRows::kVector> before;
+        std::copy_n(x.begin() + std::ptrdiff_t(first), before.size(), before.begin());
+        for (std::size_t v = 0; v != values_; ++v) move(first + v * CellRows::kVector);
+        for (std::size_t k = 0; k != before.size(); ++k) {
+          lastF_[cell + k] = g[first + k] - before[k];
+          sums[0] += double(weights_[cell + k] * std::fabs(x[first + k] - before[k]));
+          sums[1] += double(weights_[cell + k] * std::fabs(x[first + k]));
         }
+      }
     }
   });
   double change = 0, whole = 0;
