@@ -74,7 +74,7 @@ class Run : public Progress {
 
   /// Of the files that are read.
   FileHashes files;
-  /// The steps to the picture before, by pictureKeys, for those that follow; null before the first.
+  /// The steps to the picture before, by pictureKeys, for those that follow; null where none follows.
   std::shared_ptr<PictureStages> pictureStages;
 };
 

@@ -6,6 +6,7 @@
 
 #include "apps/options_digest.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/session/picture_stages.h"
 
 namespace nephele::apps {
 namespace {
@@ -77,6 +78,7 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
   std::vector<MadeCall> made;
   std::size_t skipped = 0;
   const std::size_t count = calls.made.size();
+  if (count > 1 && !run.pictureStages) run.pictureStages = std::make_shared<PictureStages>();
   for (std::size_t i = 0; i != count; ++i) {
     const Call call = calls.at(calls.made[i]);
     try {

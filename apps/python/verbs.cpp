@@ -38,7 +38,7 @@ class Kept {
 
  private:
   std::mutex mutex_;
-  std::shared_ptr<PictureStages> stages_;
+  std::shared_ptr<PictureStages> stages_ = std::make_shared<PictureStages>();
 };
 
 /// A run that prints nothing: what it has to say goes to a Watch.

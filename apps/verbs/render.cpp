@@ -52,9 +52,10 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
                               files, run);
-  const PictureStages::Keys keys = pictureKeys(*options.app, scene, picture, run);
-  if (!run.pictureStages) run.pictureStages = std::make_shared<PictureStages>();
-  PictureStages& stages = *run.pictureStages;
+  // Keys take the contents of all files.
+  const PictureStages::Keys keys =
+      run.pictureStages ? pictureKeys(*options.app, scene, picture, run) : PictureStages::Keys{};
+  PictureStages alone, &stages = run.pictureStages ? *run.pictureStages : alone;
   std::shared_ptr<const RenderVolume> volume = keys.volume.empty() ? nullptr : stages.volumeAt(keys);
   std::shared_ptr<RenderVolume> made;
   if (!volume) {

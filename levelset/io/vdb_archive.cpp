@@ -16,6 +16,8 @@
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
 #include "nephele/levelset/io/file_bytes.h"
+#include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 
 namespace nephele::detail {
 
@@ -26,7 +28,7 @@ constexpr std::uint32_t kOldestVersion = openvdb::OPENVDB_FILE_VERSION_NODE_MASK
 
 class VdbArchive : public openvdb::io::Archive {
  public:
-  explicit VdbArchive(const std::string& path) : bytes_(path), stream_(&bytes_) {
+  explicit VdbArchive(const std::string& path) : path_(path), bytes_(path), stream_(&bytes_) {
     stream_.exceptions(std::ios::badbit | std::ios::failbit);
     checkStart();
     // Holds what readers of values need to know of the file.
@@ -101,8 +103,20 @@ class VdbArchive : public openvdb::io::Archive {
     try {
       const bool checkable = isCheckable(*entry.grid),
                  hasValues = checkable && (entry.wanted || !inputHasGridOffsets());
-      checkGrid(bytes_, *entry.grid, hasValues && !entry.descriptor.isInstance());
-      if (hasValues) {
+      const bool hasTree = hasValues && !entry.descriptor.isInstance();
+      const std::vector<std::int64_t> leaves = checkGrid(bytes_, *entry.grid, hasTree);
+      if (hasTree) {
+        // OpenVDB reads all but the tree of what has none of its own.
+        openvdb::io::GridDescriptor treeless = entry.descriptor;
+        treeless.setInstanceParentName("none");
+        readGrid(entry.grid, treeless, stream_);
+        entry.grid->readTopology(stream_);
+        const auto readAll = [&](auto& grid) { readLeaves(grid, leaves); };
+        if (!entry.grid
+                 ->apply<openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid>>(
+                     readAll))
+          entry.grid->readBuffers(stream_);
+      } else if (hasValues) {
         readGrid(entry.grid, entry.descriptor, stream_);
       } else if (inputHasGridOffsets()) {
         // Nothing here computes with points, either: what their metadata tells of them suffices.
@@ -115,6 +129,31 @@ class VdbArchive : public openvdb::io::Archive {
     } catch (const Error& error) {
       throw Error(fmt::format("grid '{}': {}", name, error.what()));
     }
+  }
+
+  /// The values of the leaves of a grid whose tree is there, on all cores; `begins` says where they lie.
+  template <class Grid>
+  void readLeaves(Grid& grid, const std::vector<std::int64_t>& begins) {
+    // So many that opening the file once more does not count.
+    constexpr std::size_t kTogether = 2048;
+    std::vector<typename Grid::TreeType::LeafNodeType*> leaves;
+    grid.tree().getNodes(leaves);
+    require(leaves.size() == begins.size(), "damaged: it has another number of leaves than its nodes say");
+    parallelFor((leaves.size() + kTogether - 1) / kTogether, 1, [&](std::size_t first, std::size_t last) {
+      FileBytes bytes(path_);
+      std::istream stream(&bytes);
+      stream.exceptions(std::ios::badbit | std::ios::failbit);
+      auto metadata = std::make_shared<openvdb::io::StreamMetadata>(*metadata_);
+      openvdb::io::setStreamMetadataPtr(stream, metadata, /*transfer=*/false);
+      setFormatVersion(stream);
+      setLibraryVersion(stream);
+      openvdb::io::setDataCompression(stream, openvdb::io::getDataCompression(stream_));
+      openvdb::io::setGridClass(stream, grid.getGridClass());
+      openvdb::io::setGridBackgroundValuePtr(stream, &grid.background());
+      bytes.moveTo(begins[first * kTogether]);
+      for (std::size_t i = first * kTogether; i < std::min(last * kTogether, leaves.size()); ++i)
+        leaves[i]->readBuffers(stream, grid.saveFloatAsHalf());
+    });
   }
 
   void checkStart() {
@@ -142,6 +181,7 @@ class VdbArchive : public openvdb::io::Archive {
                               descriptor.gridName(), descriptor.getEndPos(), bytes_.size()));
   }
 
+  std::string path_;
   FileBytes bytes_;
   openvdb::io::StreamMetadata::Ptr metadata_;
   std::istream stream_;

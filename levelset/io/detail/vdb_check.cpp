@@ -113,7 +113,8 @@ class TreeCheck {
   TreeCheck(FileBytes& bytes, const ValueLayout& layout, bool asHalf, std::uint32_t compression)
       : bytes_(bytes), layout_(layout), half_(asHalf && layout.halfBytes > 0), compression_(compression) {}
 
-  void check() {
+  /// Returns where the leaves begin.
+  std::vector<std::int64_t> check() {
     if (const auto buffers = bytes_.take<std::int32_t>(); buffers != 1)
       throw Error(fmt::format("damaged: a tree of {} buffers", buffers));
     bytes_.skip(layout_.bytes);
@@ -124,7 +125,13 @@ class TreeCheck {
       bytes_.skip(layout_.bytes + 1);
     }
     for (std::int64_t i = 0; i < children; ++i) followNode<kUpper>(takeRootOrigin());
-    for (const Coord& leaf : leaves_) followLeaf(leaf);
+    std::vector<std::int64_t> begins;
+    begins.reserve(leaves_.size());
+    for (const Coord& leaf : leaves_) {
+      begins.push_back(bytes_.position());
+      followLeaf(leaf);
+    }
+    return begins;
   }
 
  private:
@@ -264,7 +271,7 @@ bool isCheckable(const openvdb::GridBase& grid) {
   return layoutOf(grid) != nullptr;
 }
 
-void checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree) {
+std::vector<std::int64_t> checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree) {
   const Return back(bytes);
   const auto compression = bytes.take<std::uint32_t>();
   checkMetadata(bytes);
@@ -286,10 +293,10 @@ void checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree) {
   } catch (const openvdb::Exception&) {
     throw Error("its transform has no inverse, or its voxels are too small");
   }
-  if (!hasTree) return;
+  if (!hasTree) return {};
   const ValueLayout* layout = layoutOf(grid);
   require(layout != nullptr, "values of this type cannot be followed");
-  TreeCheck(bytes, *layout, asHalf && asHalf->asBool(), compression).check();
+  return TreeCheck(bytes, *layout, asHalf && asHalf->asBool(), compression).check();
 }
 
 }  // namespace nephele::detail

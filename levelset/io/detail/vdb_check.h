@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "nephele/levelset/io/file_bytes.h"
 
@@ -28,7 +29,8 @@ void checkDescriptor(FileBytes& bytes);
 bool isCheckable(const openvdb::GridBase& grid);
 
 /// Compression, metadata and transform of a grid and, with `hasTree`, the tree with all its blocks. `grid`
-/// has the type of the one to be read, which must be checkable then.
-void checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree);
+/// has the type of the one to be read, which must be checkable then. Returns where the leaves begin, in the
+/// order of the tree.
+std::vector<std::int64_t> checkGrid(FileBytes& bytes, const openvdb::GridBase& grid, bool hasTree);
 
 }  // namespace nephele::detail
