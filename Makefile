@@ -55,9 +55,12 @@ fuzz: deps
 	cmake --build build-fuzz --target nephele_fuzz
 	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
 
-# The page of `nephele look` in a browser; what was seen is kept in build/look-screenshots.
+# The page of `nephele look` in a browser, with BROWSER=firefox in that one; what was seen is kept in
+# build/look-screenshots.
+BROWSER ?= chromium
+export BROWSER
 test-look: deps
-	@for tool in chromium nodejs:node npm; do command -v $${tool#*:} >/dev/null || \
+	@for tool in $(BROWSER:firefox=firefox-esr) nodejs:node npm; do command -v $${tool#*:} >/dev/null || \
 	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $${tool%:*}; done
 	cmake --preset release
 	cmake --build build --target nephele

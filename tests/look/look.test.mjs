@@ -27,7 +27,7 @@ function startCloud(t, folder) {
 async function cloud(t, options = {}) {
   const folder = folderFor(t);
   const program = await startCloud(t, folder);
-  return { folder, program, look: await LookPage.open(t, browser, program.address, options) };
+  return { folder, program, look: await LookPage.open(t, browser, program.address, { ...options, folder }) };
 }
 
 describe("a cloud", () => {
@@ -180,9 +180,7 @@ describe("a cloud", () => {
   });
 
   test("comes out as command line, recipe, look and volume", kLimit, async (t) => {
-    const { look, folder } = await cloud(t);
-    const session = await look.tab.createCDPSession();
-    await session.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: folder, browserContextId: look.tab.browserContext().id });
+    const { look, folder } = await cloud(t, { isDownloading: true });
     await look.type("#cloud-billow", "0.8");
     await look.finished();
     await look.tab.click("#open-out");

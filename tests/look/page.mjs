@@ -1,15 +1,15 @@
 // A page of the viewer, as a user has it.
 import assert from "node:assert/strict";
 import { join } from "node:path";
-import { kShots } from "./program.mjs";
+import { isFirefox, kShots } from "./program.mjs";
 
 const kPatience = 30000;
 
 export class LookPage {
   faults = [];
 
-  static async open(test, browser, address, { width = 1000, height = 620, scheme = "dark", isPhone = false } = {}) {
-    const context = await browser.createBrowserContext();
+  static async open(test, browser, address, { width = 1000, height = 620, scheme = "dark", isPhone = false, isDownloading = false, folder } = {}) {
+    const context = await browser.createBrowserContext(isDownloading ? { downloadBehavior: { policy: "allow", downloadPath: folder } } : {});
     const look = new LookPage();
     look.tab = await context.newPage();
     look.tab.setDefaultTimeout(kPatience);
@@ -17,8 +17,8 @@ export class LookPage {
     look.tab.on("request", (request) => {
       if (!/^(http:\/\/127\.0\.0\.1:|data:|blob:)/.test(request.url())) look.faults.push(`asked the network for ${request.url()}`);
     });
-    await look.tab.setViewport({ width, height, hasTouch: isPhone, isMobile: isPhone });
-    await look.tab.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+    await look.tab.setViewport(isFirefox ? { width, height } : { width, height, hasTouch: isPhone, isMobile: isPhone });
+    if (!isFirefox) await look.tab.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
     await look.tab.goto(address);
     await look.finished();
     test.after(async () => {

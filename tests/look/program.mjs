@@ -9,9 +9,13 @@ import { fileURLToPath } from "node:url";
 import puppeteer from "puppeteer-core";
 
 export const kRoot = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
-export const kShots = join(kRoot, "build/look-screenshots");
+/** BROWSER=firefox tests with Firefox, which tells nothing of phones and colour schemes. */
+export const isFirefox = process.env.BROWSER === "firefox";
+export const kShots = join(kRoot, "build/look-screenshots", isFirefox ? "firefox" : "");
 const kProgram = resolve(process.env.NEPHELE ?? join(kRoot, "build/bin/nephele"));
-const kBrowsers = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/google-chrome"];
+const kBrowsers = isFirefox
+  ? [process.env.FIREFOX, "/usr/bin/firefox-esr", "/usr/bin/firefox"]
+  : [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/google-chrome"];
 
 /** A cloud that is made in a moment. For pictures in docs/, RESOLUTION=256 makes a finer one. */
 export const kSmall = ["--resolution", process.env.RESOLUTION ?? "40", "--layers", process.env.RESOLUTION ? "4" : "2", "--quality", process.env.RESOLUTION ? "good" : "draft"];
@@ -84,7 +88,8 @@ export async function startWire(test, address) {
 
 export async function startBrowser() {
   const executablePath = kBrowsers.find((path) => path && existsSync(path));
-  if (!executablePath) throw new Error("there is no chromium; CHROMIUM=FILE names one");
+  if (!executablePath) throw new Error(`there is no ${isFirefox ? "Firefox; FIREFOX" : "chromium; CHROMIUM"}=FILE names one`);
   mkdirSync(kShots, { recursive: true });
+  if (isFirefox) return puppeteer.launch({ browser: "firefox", executablePath, headless: true });
   return puppeteer.launch({ executablePath, headless: true, args: ["--no-sandbox", "--disable-dev-shm-usage"] });
 }
