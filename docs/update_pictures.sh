@@ -233,8 +233,9 @@ fi
 if [ -n "${DISNEY:-}" ] && picture detail_4k; then
   grow default.vdb cloud $base
   grow fine.vdb cloud $base --resolution 1024
+  grow finest.vdb cloud $base --resolution 2048
   files= crops=
-  for volume in default.vdb fine.vdb felt/cumulus_detail.felt "$DISNEY"; do
+  for volume in default.vdb fine.vdb finest.vdb felt/cumulus_detail.felt "$DISNEY"; do
     name=$(basename "$volume" .vdb)
     view="--view 25,0 --sun 100,35"
     [ "$name" != cumulus_detail.felt ] || view="$view --set mesh=\"$base\""
@@ -242,7 +243,7 @@ if [ -n "${DISNEY:-}" ] && picture detail_4k; then
     show "crop_$name" "$volume" $view --size 3840x2160 --crop 940,740,1420,1010
     files="$files whole_$name.png" crops="$crops crop_$name.png"
   done
-  padding=:pad=4 tiles detail_4k.jpg 4x2 $files $crops
+  padding=:pad=4 tiles detail_4k.jpg 5x2 $files $crops
 fi
 
 if picture volumes; then

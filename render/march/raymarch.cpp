@@ -54,7 +54,8 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
   const ScatteredLight::Bytes scattered = ScatteredLight::estimateBytes(
       volume, {.longestSide = options.octaves.longestSide(), .order = options.octaves.order});
   // The sky's map may hold suns of its own.
-  const int spots = lights.map ? MarchScene::kMostSuns - int(Lights::kMost) : 0;
+  const std::size_t spots =
+      lights.map ? Environment(*lights.map).takeSpots(MarchScene::kMostSuns - int(Lights::kMost)).size() : 0;
   const double others = (options.surfaces ? double(options.surfaces->memoryBytes()) : 0.0) +
                         (options.holdout ? double(options.holdout->memoryBytes()) : 0.0);
   const double perNode = double(lights.shadowDetail) * lights.shadowDetail * lights.shadowDetail;
@@ -62,14 +63,13 @@ double estimateRenderBytes(const RenderVolume& volume, const Lights& lights, con
       !options.surfaces && !lights.deepTolerance &&
       std::ranges::none_of(lights.suns, [](const DistantLight& sun) { return bool(sun.deepShadow); });
   const double shadows =
-      perNode * (double(lights.suns.size() + std::size_t(spots)) *
-                     LightVolume::estimateBytes(volume, {.coded = coded}) +
+      perNode * (double(lights.suns.size() + spots) * LightVolume::estimateBytes(volume, {.coded = coded}) +
                  double(lights.locals.size()) * ProjectedLightVolume::estimateBytes(volume));
   const double finer =
       perNode > 1 ? perNode * double(volume.occupiedBricks().size()) * BrickGrid::kVolume * sizeof(float) : 0;
   return others + shadows + deepShadowBytes(volume, lights) + finer +
          double(ScatteredLight::kMadeTogether) * scattered.working +
-         3.0 * double(lights.names().size() + std::size_t(spots) + volume.hasEmission()) * scattered.kept +
+         3.0 * double(lights.names().size() + spots + volume.hasEmission()) * scattered.kept +
          double(camera.window().width()) * camera.window().height() * floats * sizeof(float);
 }
 

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/render/light/light_volume.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"
 #include "tests/support/density.h"
@@ -167,6 +168,23 @@ TEST(Environment, OfOneColourIsTheConstantSky) {
       for (int x = 0; x != 16; ++x)
         // The iteration for the light ends at 1.5e-3 of it.
         ASSERT_NEAR(map.at(c, x, y), sky.at(c, x, y), 2e-3f * sky.at(c, x, y) + 1e-6f);
+}
+
+// A map takes a light volume for each spot that it has, not for each that it might have.
+TEST(Environment, SpotsAreWhatMemoryIsEstimatedFor) {
+  const RenderVolume volume(smallCloud());
+  const Camera camera = Camera::framing(volume.outline(), 30, 20, {16, 12, 35});
+  const auto bytesFor = [&](const Environment& map) {
+    return estimateRenderBytes(volume, skyOf(map), camera, {});
+  };
+  std::vector<Vec3f> pixels(64 * 32, Vec3f{1, 1, 1});
+  const double even = bytesFor(Environment(64, 32, pixels));
+  pixels[10 * 64 + 20] = {5000, 5000, 5000};
+  const double oneSpot = bytesFor(Environment(64, 32, pixels)) - even;
+  const double light = LightVolume::estimateBytes(volume, {.coded = true});
+  EXPECT_GT(oneSpot, light);
+  // Beside it, what scatters of it.
+  EXPECT_LT(oneSpot, light + 0.5 * even);
 }
 
 TEST(Environment, FurnaceIsAsBrightAsItsMapWhereItIsOpaque) {
