@@ -12,6 +12,7 @@
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
+#include "nephele/levelset/io/detail/vdb_identifier.h"
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
@@ -196,6 +197,7 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
                                                                      : openvdb::io::COMPRESS_ZIP));
     file.write(labelled);
     file.close();
+    detail::identifyByContents(output.temporaryPath());
     // OpenVDB does not look whether its stream failed: what it wrote must hold what it announces.
     detail::readOpenVdb(output.temporaryPath(), [](const auto&, const auto&) { return false; });
   } catch (const std::bad_alloc&) {

@@ -58,6 +58,16 @@ TEST(CloudVerb, IsTheSameAtAnyThreadCount) {
   EXPECT_NE(one->values(), grown("--threads 1 --seed 9")->values());
 }
 
+TEST(CloudVerb, IsTheSameFileEachTime) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("cloud.vdb");
+  const auto written = [&] {
+    EXPECT_EQ(runProgram("cloud " + kSphere + " -o " + path + " --resolution 40 --layers 2").exitCode, 0);
+    return textOf(path);
+  };
+  EXPECT_TRUE(written() == written());
+}
+
 TEST(CloudVerb, GrowsOnALevelSetAsOnItsMesh) {
   const TemporaryFolder folder;
   ASSERT_EQ(runProgram("levelset " + kSphere + " -o " + folder.file("in.vdb") + " --resolution 64").exitCode,

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <regex>
 
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
@@ -59,6 +60,26 @@ TEST(VdbIo, LevelSetComesBackBitForBitThroughAFile) {
   const auto after = toBricks(read);
   EXPECT_EQ(before->background(), after->background());
   expectSameSamples(*before, *after);
+}
+
+// Also what is random in files that OpenVDB writes: the identifier behind the first 21 bytes.
+TEST(VdbIo, EqualGridsMakeEqualFiles) {
+  const TemporaryFolder folder;
+  const auto written = [&](const std::string& name, float inner) {
+    writeVdbFile(folder.file(name), {toVdb(smallGrid(0, inner), {"density", Class::fogVolume})},
+                 {{"creator", "test"}});
+    return textOf(folder.file(name));
+  };
+  const std::string first = written("a.vdb", 0.5f), again = written("b.vdb", 0.5f);
+  EXPECT_TRUE(first == again);
+  const std::string identifier = first.substr(21, 36), other = written("c.vdb", 0.25f).substr(21, 36);
+  EXPECT_TRUE(std::regex_match(identifier, std::regex("[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")))
+      << identifier;
+  EXPECT_NE(identifier, other);
+  // Every byte of it follows from the contents.
+  int same = 0;
+  for (std::size_t i = 0; i != identifier.size(); ++i) same += identifier[i] == other[i];
+  EXPECT_LT(same, 20) << identifier << ' ' << other;
 }
 
 TEST(VdbIo, BricksHoldTheirNeighboursBorderSamples) {
