@@ -376,10 +376,7 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic
         at.next->fill(0.0f);
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
-      if (slice > 0 && inside == 0) {
-        store(brick - 1, kBrick, sum, at);
-        finished = brick;
-      }
+      if (slice > 0 && inside == 0) store(finished++, kBrick, sum, at);
       if (slice < slices) store(brick, inside, sum, at);
       detail::addSlice(*at.after, sum);
       std::swap(at.before, at.after);
