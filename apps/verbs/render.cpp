@@ -55,7 +55,8 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   // Keys take the contents of all files.
   const PictureStages::Keys keys =
       run.pictureStages ? pictureKeys(*options.app, scene, picture, run) : PictureStages::Keys{};
-  PictureStages alone, &stages = run.pictureStages ? *run.pictureStages : alone;
+  PictureStages alone;
+  PictureStages& stages = run.pictureStages ? *run.pictureStages : alone;
   std::shared_ptr<const RenderVolume> volume = keys.volume.empty() ? nullptr : stages.volumeAt(keys);
   std::shared_ptr<RenderVolume> made;
   if (!volume) {

@@ -14,6 +14,10 @@ namespace {
 // No key contains it, so that keys side by side cannot be mistaken for others.
 constexpr char kBetween = '\n';
 
+std::size_t bytesOf(const KeptLayers::Layer& layer) {
+  return layer.displacement->memoryBytes() + (layer.level ? layer.level->memoryBytes() : 0);
+}
+
 }  // namespace
 
 float KeptLayers::reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize) {
@@ -72,8 +76,8 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
 }
 
 void KeptLayers::keep(Layer layer) {
-  std::size_t bytes = layer.bytes;
-  for (const Layer& before : layers_) bytes += before.bytes;
+  std::size_t bytes = bytesOf(layer);
+  for (const Layer& before : layers_) bytes += bytesOf(before);
   if (wantedIndex_ != layers_.size() || bytes > kMostBytes) {
     distance_.reset();
     return;

@@ -58,8 +58,6 @@ class KeptLayers {
     std::shared_ptr<PackedGrid> displacement, level{};
     std::optional<ScalarField> renormalised{};
     CumuloLayerReport report{};
-    /// What it holds.
-    std::size_t bytes = 0;
   };
   /// The layer of a step that is there under its key, those of the layers before, and these numbers; or null.
   /// One of another key is let go, with all after it. @throws Error if there is no key for each layer.

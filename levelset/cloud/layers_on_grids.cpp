@@ -127,7 +127,6 @@ class LayerSampler {
     const CumuloSampled sampled = sampledOf(step, layer);
     if (isKept) {
       layer.report = reports.back();
-      layer.bytes = layer.displacement->memoryBytes() + (layer.level ? layer.level->memoryBytes() : 0);
       options_.kept->keep(std::move(layer));
     }
     return sampled;

@@ -131,28 +131,25 @@ struct LightVolume::Sweep {
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
         const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
         float* rows = patch.samples.data() + (v1 - patch.v) * kPitch + (u1 - patch.u);
-        const int countU = u2 - u1, countV = v2 - v1;
+        const auto copy = [&, countU = u2 - u1, countV = v2 - v1](const auto& sampleAt) {
+          if (u == 0)
+            copyRows(countU, countV, rows, sampleAt);
+          else
+            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
+        };
         const int first = insideBrick(k) * sampleStride[w] + insideBrick(u1) * sampleStride[u] +
                           insideBrick(v1) * sampleStride[v];
         if (!holds) {
-          copyRows(countU, countV, rows, [](int, int) { return 0.0f; });
+          copy([](int, int) { return 0.0f; });
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
           const std::uint16_t* from = coded->codes() + entry.first + first;
-          const auto sampleAt = [&](int x, int y) {
+          copy([&](int x, int y) {
             return (float(from[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
-          };
-          if (u == 0)
-            copyRows(countU, countV, rows, sampleAt);
-          else
-            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
+          });
         } else {
           const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
-          const auto sampleAt = [&](int x, int y) { return from[x + y * sampleStride[v]]; };
-          if (u == 0)
-            copyRows(countU, countV, rows, sampleAt);
-          else
-            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
+          copy([&](int x, int y) { return from[x + y * sampleStride[v]]; });
         }
         u1 = u2;
       }
