@@ -27,7 +27,7 @@ class PackedGrid;
 class KeptLayers {
  public:
   /// Of all layers together.
-  static constexpr std::size_t kMostBytes = std::size_t(32) << 20;
+  static constexpr std::size_t kMostBytes = std::size_t(16) << 20;
 
   /// What the next cloud depends on. Equal keys stand for equal layers.
   struct Keys {

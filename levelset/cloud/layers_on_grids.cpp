@@ -190,9 +190,6 @@ class LayerSampler {
     for (int part = 0; part < count; ++part) {
       if (part + 1 < count) bakePart(part + 1);
       BrickSamples window = takeWindow(part);
-      // The next window needs the end of this part and all of the next one.
-      while (parts.size() > (part + 1 < count ? 2 : 0)) parts.pop_front();
-      detail::releaseFreed();
       const double done = kShareOfBake * std::min(part + 2, count) / count;
       MedialSmoothing smooth{0, std::vector<bool>(window.pool.size())};
       if (step.bound > 0) smooth = smoothMedialJumps(window, smoothing, SubProgress(progress_, done, done));
@@ -200,6 +197,9 @@ class LayerSampler {
       for (std::size_t b = 0; b < packing.size(); ++b)
         if (packing[b] == Packing::whole && smooth.signless[b]) packing[b] = Packing::absolute;
       detail::appendPacked(*layer, std::move(window), packing);
+      // The next window needs this part and all of the next one.
+      if (part > 0) parts.pop_front();
+      detail::releaseFreed();
     }
     report(step, total, voxel);
     return layer;

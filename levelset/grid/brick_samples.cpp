@@ -35,12 +35,16 @@ void BrickSamples::append(const std::vector<Vec3i>& bricks) {
   Store store{SampleStore(bricks.size() * kCount), bricks[0].z};
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     store.lastZ = std::max(store.lastZ, bricks[i].z);
-    table[bricks[i]] = std::int32_t(pool.size());
-    placed.push_back({std::int32_t(pool.size()), bricks[i]});
-    pool.push_back(store.samples.data() + i * kCount);
-    ranges.emplace_back();
+    appendShared(bricks[i], store.samples.data() + i * kCount, {});
   }
   stores.push_back(std::move(store));
+}
+
+void BrickSamples::appendShared(const Vec3i& brick, float* samples, const Interval& range) {
+  table[brick] = std::int32_t(pool.size());
+  placed.push_back({std::int32_t(pool.size()), brick});
+  pool.push_back(samples);
+  ranges.push_back(range);
 }
 
 void BrickSamples::separate() {
@@ -62,12 +66,8 @@ void BrickSamples::separate() {
     brick.pool -= std::int32_t(constants - 1);
     table[brick.brick] = brick.pool;
   }
-  const std::size_t first = pool.size();
-  append(bricks);
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    std::copy_n(sources[source[i]], kCount, pool[first + i]);
-    ranges[first + i] = sourceRanges[source[i]];
-  }
+  for (std::size_t i = 0; i < source.size(); ++i)
+    appendShared(bricks[i], sources[source[i]], sourceRanges[source[i]]);
 }
 
 std::uint32_t neighboursReadAround(int sample) {

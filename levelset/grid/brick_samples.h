@@ -59,7 +59,7 @@ struct BrickSamples {
   float background = 0.0f;
   /// Indices into the pool. Pool brick 0 is all background.
   FlatBrickTable table;
-  /// kCount samples of each, x fastest. Bricks of nothing but the background may share those of brick 0.
+  /// kCount samples of each, x fastest; several bricks may share theirs.
   std::vector<float*> pool;
   /// Of those samples.
   std::vector<Interval> ranges;
@@ -76,7 +76,10 @@ struct BrickSamples {
 
   /// Appends bricks whose samples are yet to be written, in one store, at the end of the pool.
   void append(const std::vector<Vec3i>& bricks);
-  /// Gives every position but those of pool brick 0 a brick of its own.
+  /// Appends a brick whose samples are those of another, here or elsewhere, which must outlive it.
+  void appendShared(const Vec3i& brick, float* samples, const Interval& range);
+  /// Gives every position but those of pool brick 0 a brick of its own; those of a constant share its
+  /// samples.
   void separate();
 };
 

@@ -28,8 +28,8 @@ float largestMoment(const Phase& phase) {
 }  // namespace
 
 BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
-                       const Octaves& itsOctaves, const SkyPart* before, const Progress& progress,
-                       const Surfaces* surfaces)
+                       const Octaves& itsOctaves, std::shared_ptr<const SkyPart>* before,
+                       const Progress& progress, const Surfaces* surfaces)
     : source(&volume),
       medium(itsMedium),
       lights(itsLights),
@@ -230,7 +230,7 @@ void BakedLight::setColours(const RenderVolume& volume, float most) {
 
 // Sets what light does after its first scattering; the sky's part is that of `before` where skies are
 // equal.
-void BakedLight::scatter(const SkyPart* before, const Progress& progress) {
+void BakedLight::scatter(std::shared_ptr<const SkyPart>* before, const Progress& progress) {
   const float albedo = (meanAlbedo.x + meanAlbedo.y + meanAlbedo.z) / 3;
   const bool once = octaves.count == 1;
   forward = once ? ForwardLight(medium.phase)
@@ -252,8 +252,10 @@ void BakedLight::scatter(const SkyPart* before, const Progress& progress) {
     }
   const std::vector<ScatteredSource> skies = partsOfSky();
   scene.skyParts = int(skies.size());
-  const bool isSkyAsBefore = before && before->radiance == lights.sky && before->map == sky &&
-                             before->parts == scene.skyParts && before->colours == scene.colours;
+  const SkyPart* left = before ? before->get() : nullptr;
+  const bool isSkyAsBefore = left && left->radiance == lights.sky && left->map == sky &&
+                             left->parts == scene.skyParts && left->colours == scene.colours;
+  if (before && !isSkyAsBefore) before->reset();
   for (std::size_t part = 0; part != skies.size(); ++part) {
     from.emplace_back();
     const int colour = colours == 1 ? 0 : int(part), like = sky ? colour : colourLike(colour, {1, 1, 1});
@@ -262,7 +264,7 @@ void BakedLight::scatter(const SkyPart* before, const Progress& progress) {
     if (like == colour) solves.push_back({colour, once ? 0 : meanAlbedo[colour], skies[part]});
   }
   scattered.assign(from.size(), nullptr);
-  if (isSkyAsBefore) std::ranges::copy(before->scattered, scattered.end() - scene.skyParts);
+  if (isSkyAsBefore) std::ranges::copy(left->scattered, scattered.end() - scene.skyParts);
   const std::size_t glowsFrom = solves.size();
   if (source->hasEmission() && !once && meanAlbedo != Vec3f{})
     for (int c = 0; c != scene.colours; ++c) solves.push_back({c, meanAlbedo[c], sourceOfGlow(c)});

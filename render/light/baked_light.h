@@ -30,9 +30,10 @@ struct SkyPart {
 /// A volume, its medium and the light in it, tied together for the kernels: all that does not depend on the
 /// camera.
 struct BakedLight {
-  /// `before`: of the light before, if there was one. Keeps a reference to `volume`.
+  /// `before`: what is left of the light before, or null; let go once it is known that the sky is another
+  /// one, before memory is taken for that. Keeps a reference to `volume`.
   BakedLight(const RenderVolume& volume, const Medium& itsMedium, const Lights& itsLights,
-             const Octaves& itsOctaves, const SkyPart* before, const Progress& progress,
+             const Octaves& itsOctaves, std::shared_ptr<const SkyPart>* before, const Progress& progress,
              const Surfaces* surfaces);
   BakedLight(const BakedLight&) = delete;
   BakedLight& operator=(const BakedLight&) = delete;
@@ -84,7 +85,7 @@ struct BakedLight {
   bool readsCodes() const;
   void code();
   void setColours(const RenderVolume& volume, float most);
-  void scatter(const SkyPart* before, const Progress& progress);
+  void scatter(std::shared_ptr<const SkyPart>* before, const Progress& progress);
   // What is solved for: light of one colour `from` somewhere.
   struct Solve {
     int colour;

@@ -90,7 +90,7 @@ void LitVolume::relight(const Lights& lights, const Progress& progress) {
   isLit_ = false;
   lightSeconds_ = 0;
   if (isSeen(*volume_, medium_)) {
-    light_ = std::make_shared<const detail::BakedLight>(*volume_, medium_, lights_, octaves_, skyPart_.get(),
+    light_ = std::make_shared<const detail::BakedLight>(*volume_, medium_, lights_, octaves_, &skyPart_,
                                                         progress, surfaces_.get());
     lightSeconds_ = secondsSince(start);
   }

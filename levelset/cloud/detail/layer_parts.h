@@ -54,7 +54,7 @@ BrickSamples noSamples(const Box& box, float voxelSize, const BrickSlab& slab);
 /// voxels.
 LayerParts partsOf(const Box& box, float voxelSize, int reach);
 
-/// Copies of the bricks of `slab` from those of neighbouring parts.
+/// The bricks of `slab`, whose samples are those of neighbouring parts, which must outlive it.
 BrickSamples windowOf(const std::deque<LayerPart>& parts, const BrickSlab& slab, const Box& box,
                       float voxelSize);
 
