@@ -95,7 +95,9 @@ GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Prog
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
   const std::vector<CumuloLayer>& layers = options.layers;
   const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);
-  const float reach = cumuloExteriorBand(layers, options.voxelSize, edge, kept != nullptr);
+  const Box box = boundingBox(mesh);
+  const std::size_t keptCount = kept ? KeptLayers::count(layers, box, options.voxelSize) : 0;
+  const float reach = cumuloExteriorBand(layers, options.voxelSize, edge, keptCount);
   require(reach <= kFarthestVoxels * options.voxelSize,
           fmt::format("the layers move the surface by up to {:.3g}, which is {:.3g} voxels, allowed: up to "
                       "{:g}; use a smaller amplitude, a higher frequency or larger voxels",
@@ -107,13 +109,13 @@ GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Prog
     progress.begin("distance");
     return meshDistance(mesh, distance, progress);
   };
-  const ScalarField base = kept ? kept->distance(fmt::format("{} {} {}", distance.voxelSize,
-                                                             distance.exteriorBand, distance.interiorBand),
-                                                 makeBase)
-                                : makeBase();
+  const std::string numbers =
+      fmt::format("{} {} {}", distance.voxelSize, distance.exteriorBand, distance.interiorBand);
+  const ScalarField base =
+      kept ? kept->distance(numbers, keptCount + 1 == layers.size(), makeBase) : makeBase();
   return griddedCumulo(base, layers,
                        {.voxelSize = options.voxelSize,
-                        .box = boundingBox(mesh),
+                        .box = box,
                         .newtonSteps = options.newtonSteps,
                         .edge = edge,
                         .closestPoint = closestPoint(mesh),

@@ -53,19 +53,27 @@ class GridBuilder {
   }
 
   VoxelGrid<float> build(const std::string& maker, const Progress& progress) {
+    VoxelGrid<float> grid(maker, double(voxel_), rule_.background());
+    fill(
+        grid, [] {}, progress);
+    return grid;
+  }
+
+  /// Calls `afterStrip` whenever bricks have been added.
+  template <class AfterStrip>
+  void fill(VoxelGrid<float>& grid, const AfterStrip& afterStrip, const Progress& progress) {
     const auto blockOf = [&](float x, int shift) { return int(std::floor(x / voxel_ / kBlock)) + shift; };
     const Vec3f low = box_.min, high = box_.max;
     const Vec3i first{blockOf(low.x, 0), blockOf(low.y, 0), blockOf(low.z, 0)};
     const Vec3i count = Vec3i{blockOf(high.x, 1), blockOf(high.y, 1), blockOf(high.z, 1)} - first;
-    VoxelGrid<float> grid(maker, double(voxel_), rule_.background());
     const int width = stripWidth(), strips = (count.y + width - 1) / width;
     for (int i = 0; i < count.z * strips; ++i) {
       const int y = i % strips * width;
       const Vec3i strip{count.x, std::min(width, count.y - y), 1};
       addStrip(first + Vec3i{0, y, i / strips}, strip, grid, progress);
+      afterStrip();
       progress.advance(double(i + 1) / (count.z * strips));
     }
-    return grid;
   }
 
  private:
@@ -238,8 +246,12 @@ CloudLevels cloudLevels(const GriddedCumulo& cloud, float voxelSize, float halfW
   detail::releaseFreed();
   GridBuilder builder(cloud, voxelSize, LevelSetRule(halfWidth), 1.0f);
   const std::vector<Block::Misjudged>& misjudged = builder.keepMisjudged();
-  CloudLevels result{NarrowBand(builder.build("levels", progress), -halfWidth, halfWidth),
-                     VoxelGrid<float>("estimates", double(voxelSize), 0.0f)};
+  CloudLevels result{
+      NarrowBand(VoxelGrid<float>("levels", double(voxelSize), -halfWidth), -halfWidth, halfWidth),
+      VoxelGrid<float>("estimates", double(voxelSize), 0.0f)};
+  builder.fill(
+      result.levels.unfinished(), [&] { result.levels.takeOver(false); }, progress);
+  result.levels.takeOver(true);
   for (const Block::Misjudged& m : misjudged) {
     const Vec3i brick = brickOf(m.voxel);
     std::int32_t entry = result.estimates.entryAt(brick);

@@ -14,16 +14,25 @@ namespace {
 // No key contains it, so that keys side by side cannot be mistaken for others.
 constexpr char kBetween = '\n';
 
-std::size_t bytesOf(const KeptLayers::Layer& layer) {
-  return layer.displacement->memoryBytes() + (layer.level ? layer.level->memoryBytes() : 0);
-}
-
 }  // namespace
 
-float KeptLayers::reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize) {
+std::size_t KeptLayers::count(const std::vector<CumuloLayer>& layers, const Box& box, float voxelSize) {
+  constexpr double kMostBricks = 4096;
+  const auto bricks = [&](std::size_t index) {
+    const float edge = float(BrickGrid::kBrick) * cumuloVoxelSize(layers, index, voxelSize);
+    const Vec3f size = (box.max - box.min) * (1 / edge);
+    return double(size.x) * double(size.y) * double(size.z);
+  };
+  std::size_t count = 0;
+  while (count + 1 < layers.size() && bricks(count) <= kMostBricks) ++count;
+  return count;
+}
+
+float KeptLayers::reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize,
+                        std::size_t count) {
   constexpr float kStepsPerBound = 4;
-  float reach = 0;
-  for (std::size_t i = layers.size(); i-- > index;) {
+  float reach = displacementBound(layers, std::max(index, count));
+  for (std::size_t i = count; i-- > index;) {
     const float bound = detail::layerBound(layers, i);
     const float step = std::max(bound, voxelSize) / kStepsPerBound;
     reach = bound + step * std::ceil(reach / step);
@@ -38,7 +47,8 @@ bool KeptLayers::areLaterAsked(std::span<const CumuloLayer> layers) {
   });
 }
 
-ScalarField KeptLayers::distance(const std::string& numbers, const std::function<ScalarField()>& make) {
+ScalarField KeptLayers::distance(const std::string& numbers, bool isKept,
+                                 const std::function<ScalarField()>& make) {
   const std::string key = keys_.shape + kBetween + numbers;
   taken_ = 0;
   if (distanceKey_ != key) {
@@ -47,8 +57,10 @@ ScalarField KeptLayers::distance(const std::string& numbers, const std::function
     distance_.reset();
     distanceKey_ = key;
   }
-  if (!distance_) distance_ = make();
-  return *distance_;
+  if (distance_) return *distance_;
+  ScalarField made = make();
+  if (isKept) distance_ = made;
+  return made;
 }
 
 std::string KeptLayers::keyOf(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
@@ -65,7 +77,6 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
           fmt::format("KeptLayers: expected a key for each of {} layers, got {}", layers.size(),
                       keys_.layers.size()));
   wanted_ = keyOf(step, layers, numbers);
-  wantedIndex_ = step.index;
   if (step.index < layers_.size() && layerKeys_[step.index] == wanted_) {
     ++taken_;
     return &layers_[step.index];
@@ -76,12 +87,6 @@ const KeptLayers::Layer* KeptLayers::find(const CumuloStep& step, const std::vec
 }
 
 void KeptLayers::keep(Layer layer) {
-  std::size_t bytes = bytesOf(layer);
-  for (const Layer& before : layers_) bytes += bytesOf(before);
-  if (wantedIndex_ != layers_.size() || bytes > kMostBytes) {
-    distance_.reset();
-    return;
-  }
   layers_.push_back(std::move(layer));
   layerKeys_.push_back(std::move(wanted_));
 }

@@ -20,15 +20,11 @@ class PackedGrid;
 /// What a cloud comes to does not depend on what was kept. But layers must reach as far as later ones bring
 /// the surface: here they reach farther, in steps of a quarter of their own height, so that a layer is not
 /// made again for a slightly higher one after it. A few voxels in a million are others than in a cloud
-/// without kept layers. The last layer is not kept, nor are fine ones that would make it all more than
-/// `kMostBytes`: they take the most memory, and changes before them are likelier. Where some are not kept,
-/// the distance, which is soon made beside them, is not either. Nothing of a cloud without keys is kept. For
-/// one cloud at a time.
+/// without kept layers. The last layer is not kept, nor are fine ones, see `count`: they take the most
+/// memory, and changes before them are likelier. Where others than the last are not kept, the distance, which
+/// is soon made beside them, is not either. Nothing of a cloud without keys is kept. For one cloud at a time.
 class KeptLayers {
  public:
-  /// Of all layers together.
-  static constexpr std::size_t kMostBytes = std::size_t(16) << 20;
-
   /// What the next cloud depends on. Equal keys stand for equal layers.
   struct Keys {
     std::string shape;
@@ -42,15 +38,19 @@ class KeptLayers {
   /// Lets everything go.
   void forget() { *this = {}; }
 
-  /// How far layers reach here: `layers[index]` and those after it.
-  static float reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize);
+  /// How many of these layers on a shape in `box` are kept, from the first on: never the last, and none from
+  /// the first on whose grid could have more than 4096 bricks in the box.
+  static std::size_t count(const std::vector<CumuloLayer>& layers, const Box& box, float voxelSize);
+  /// How far layers reach where so many are kept: `layers[index]` and those after it.
+  static float reach(const std::vector<CumuloLayer>& layers, std::size_t index, float voxelSize,
+                     std::size_t count);
   /// Whether the first of these layers is left out where those after it are low, and so depends on their
   /// amplitudes: where one of them vanishes somewhere, since that saves much.
   static bool areLaterAsked(std::span<const CumuloLayer> layers);
 
-  /// The distance that is there under the key of the shape and these numbers, or what `make` returns. Where
-  /// they are others than before, all layers are let go first.
-  ScalarField distance(const std::string& numbers, const std::function<ScalarField()>& make);
+  /// The distance that is there under the key of the shape and these numbers, or what `make` returns, which
+  /// stays for the next cloud if it `isKept`. Where they are others than before, all layers are let go first.
+  ScalarField distance(const std::string& numbers, bool isKept, const std::function<ScalarField()>& make);
 
   /// A finished layer: its displacement, and the l_i that the next one reads, sampled, or a distance of its
   /// own where it was turned into one.
@@ -63,7 +63,7 @@ class KeptLayers {
   /// One of another key is let go, with all after it. @throws Error if there is no key for each layer.
   const Layer* find(const CumuloStep& step, const std::vector<CumuloLayer>& layers,
                     const std::string& numbers);
-  /// Keeps the layer that was not found last, if there is room for it and those before it are there.
+  /// Keeps the layer that was not found last, after those before it.
   void keep(Layer layer);
 
  private:
@@ -72,7 +72,6 @@ class KeptLayers {
 
   Keys keys_;
   std::string distanceKey_, wanted_;
-  std::size_t wantedIndex_ = 0;
   std::optional<ScalarField> distance_;
   std::vector<std::string> layerKeys_;
   std::vector<Layer> layers_;

@@ -97,17 +97,19 @@ class LayerSampler {
  public:
   LayerSampler(const std::vector<CumuloLayer>& layers, const CumuloGridOptions& options,
                const Progress& progress)
-      : layers_(layers), options_(options), progress_(progress), reach_(reachOf(0)) {}
+      : layers_(layers),
+        options_(options),
+        progress_(progress),
+        keptCount_(options.kept ? KeptLayers::count(layers, options.box, options.voxelSize) : 0),
+        reach_(reachOf(0)) {}
 
   /// Of a layer and those after it.
   float reachOf(std::size_t index) const {
-    return options_.kept ? KeptLayers::reach(layers_, index, options_.voxelSize)
-                         : displacementBound(layers_, index);
+    return KeptLayers::reach(layers_, index, options_.voxelSize, keptCount_);
   }
 
   CumuloSampled operator()(const CumuloStep& step) {
-    // The last layer is another one wherever anything is.
-    const bool isKept = options_.kept && step.index + 1 < layers_.size();
+    const bool isKept = step.index < keptCount_;
     if (isKept)
       if (const KeptLayers::Layer* kept = options_.kept->find(step, layers_, numbersOf(step))) {
         level_ = kept->level;
@@ -167,7 +169,7 @@ class LayerSampler {
     const LayerParts cut = detail::partsOf(box, voxel, smoothing.dilation + smoothing.steps);
     const std::shared_ptr<PackedGrid> layer = detail::emptyPackedGrid(detail::noSamples(box, voxel, cut.all));
     const std::span<const CumuloLayer> after = std::span(layers_).subspan(step.index);
-    const bool areLaterAsked = !options_.kept || KeptLayers::areLaterAsked(after);
+    const bool areLaterAsked = step.index >= keptCount_ || KeptLayers::areLaterAsked(after);
     const ScalarField needed =
         areLaterAsked
             ? detail::neededDisplacement(step, after, 0, options_.voxelSize)
@@ -378,6 +380,7 @@ class LayerSampler {
   const std::vector<CumuloLayer>& layers_;
   const CumuloGridOptions& options_;
   const Progress& progress_;
+  std::size_t keptCount_;
   float reach_;
   /// The sampled l_i that the next layer reads, if there is one.
   std::shared_ptr<PackedGrid> level_;
@@ -394,9 +397,9 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
   return std::min(wave / kFewestSamplesPerWave, std::max(wave / aimed, resultVoxelSize));
 }
 
-float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge, bool areKept) {
-  return (areKept ? KeptLayers::reach(layers, 0, voxelSize) : displacementBound(layers)) +
-         cumuloInteriorBand(layers, voxelSize, edge);
+float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge,
+                         std::size_t keptCount) {
+  return KeptLayers::reach(layers, 0, voxelSize, keptCount) + cumuloInteriorBand(layers, voxelSize, edge);
 }
 
 float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge) {

@@ -78,9 +78,9 @@ float cumuloVoxelSize(const std::vector<CumuloLayer>& layers, std::size_t index,
 
 /// Exterior band (world units) in which the base must be a distance for `layers`; the interior one is
 /// `cumuloInteriorBand`. They cover the displacement, the coarsest grid's interpolation and the Newton steps.
-/// With kept layers, which reach farther, they are wider.
+/// Layers of which so many are kept reach farther, see KeptLayers.
 float cumuloExteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f,
-                         bool areKept = false);
+                         std::size_t keptCount = 0);
 float cumuloInteriorBand(const std::vector<CumuloLayer>& layers, float voxelSize, float edge = 0.0f);
 
 /// Memory of the grids of `griddedCumulo`, bytes.

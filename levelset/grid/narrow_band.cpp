@@ -20,13 +20,16 @@ bool isSame(float a, float b) {
 }  // namespace
 
 NarrowBand::NarrowBand(VoxelGrid<float> grid, float least, float greatest)
-    : grid_(std::move(grid)),
-      least_(least),
-      greatest_(greatest),
-      bricks_(grid_.sampledBricks()),
-      parts_((bricks_.size() + kPart - 1) / kPart) {
-  parallelFor(parts_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t part = begin; part < end; ++part)
+    : grid_(std::move(grid)), least_(least), greatest_(greatest) {
+  takeOver(true);
+}
+
+void NarrowBand::takeOver(bool isFinished) {
+  const std::size_t taken = parts_.size(), added = grid_.sampledBricks();
+  parts_.resize(isFinished ? (added + kPart - 1) / kPart : added / kPart);
+  bricks_.resize(std::min(parts_.size() * kPart, added));
+  parallelFor(parts_.size() - taken, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t part = taken + begin; part < taken + end; ++part)
       take(part * kPart, std::min((part + 1) * kPart, bricks_.size()));
   });
 }

@@ -16,6 +16,13 @@ class NarrowBand {
   /// All cores.
   NarrowBand(VoxelGrid<float> grid, float least, float greatest);
 
+  /// For grids that are made bit by bit: the grid, to which bricks may be added, and those that `takeOver`
+  /// took are not in it any more.
+  VoxelGrid<float>& unfinished() { return grid_; }
+  /// Takes over most bricks that were added; all of them with `isFinished`, after which there must be no
+  /// more.
+  void takeOver(bool isFinished);
+
   /// As those of VoxelGrid.
   double voxelSize() const { return grid_.voxelSize(); }
   float background() const { return grid_.background(); }
@@ -45,6 +52,7 @@ class NarrowBand {
   // Its samples have been given back.
   VoxelGrid<float> grid_;
   float least_, greatest_;
+  /// Of those that were taken over.
   std::vector<Brick> bricks_;
   // Of VoxelGrid::kTogether bricks each.
   std::vector<std::vector<float>> parts_;

@@ -53,7 +53,9 @@ TEST(VoxelGrid, BrickThatBecomesConstantForgetsItsSamples) {
 TEST(NarrowBand, HoldsEveryBitInLessMemory) {
   constexpr float kEnd = 0.25f;
   VoxelGrid<float> grid("test", 0.5, -kEnd), same("test", 0.5, -kEnd);
-  for (VoxelGrid<float>* g : {&grid, &same}) g->setConstant({-3, 0, 1}, kEnd);
+  // The same, taken over while it is made.
+  NarrowBand grown(VoxelGrid<float>("test", 0.5, -kEnd), -kEnd, kEnd);
+  for (VoxelGrid<float>* g : {&grid, &same, &grown.unfinished()}) g->setConstant({-3, 0, 1}, kEnd);
   for (int b = 0; b < 1100; ++b) {
     const Vec3i brick{b % 11 - 5, b / 11 % 10, b / 110 + 4};
     float* values = grid.add(brick);
@@ -64,19 +66,25 @@ TEST(NarrowBand, HoldsEveryBitInLessMemory) {
     values[4] = -0.0f;
     values[5] = std::nextafter(kEnd, 0.0f);
     std::copy_n(values, kBrickSamples, same.add(brick));
+    std::copy_n(values, kBrickSamples, grown.unfinished().add(brick));
+    if (b % 100 == 0) grown.takeOver(false);
   }
+  grown.takeOver(true);
   const std::size_t before = same.memoryBytes();
   const NarrowBand band(std::move(grid), -kEnd, kEnd);
   // A quarter of the values lie between; two bits for each, and the table, are the rest.
   EXPECT_LT(band.memoryBytes(), before / 2);
+  EXPECT_LT(grown.memoryBytes(), before / 2);
   EXPECT_EQ(band.background(), -kEnd);
   EXPECT_EQ(band.voxelSize(), 0.5);
   const VoxelGrid<float> back = band.voxels();
   int bricks = 0, equal = 0;
   same.forEachBrick([&](const Vec3i& brick, std::int32_t entry) {
     ++bricks;
-    std::array<float, kBrickSamples> read;
+    std::array<float, kBrickSamples> read, readGrown;
     band.read(band.entryAt(brick), read.data());
+    grown.read(grown.entryAt(brick), readGrown.data());
+    EXPECT_EQ(std::memcmp(read.data(), readGrown.data(), sizeof read), 0);
     if (entry < 0) {
       EXPECT_EQ(read[17], kEnd);
       EXPECT_LT(back.entryAt(brick), 0);
