@@ -39,9 +39,8 @@ CumuloBytes estimatedCumuloBytes(const std::vector<CumuloLayer>& layers, float v
         std::max(kGrowth * area * width, steiner) / std::pow(double(BrickGrid::kBrick) * voxel, 3);
     const LayerParts cut = detail::partsOf(box.expanded(displacementBound(layers) + margin), voxel,
                                            kLeastDilation + MedialSmoothingOptions{}.steps);
-    // Of a layer in parts: three, of which one has neighbours around it.
-    const double share =
-        std::min(1.0, (3.0 * cut.thickness + 3.0 * cut.halo) / double(cut.all.end - cut.all.begin));
+    // Of a layer in parts: three.
+    const double share = std::min(1.0, 3.0 * cut.thickness / double(cut.all.end - cut.all.begin));
     const double packed = cut.count() > 1 ? kKept * bricks * kPacked : 0.0;
     bytes.peak = std::max(bytes.peak, bytes.kept + sum + kWork * share * bricks * kUnpacked + packed);
     bytes.kept += kKept * bricks * kPacked;

@@ -2,9 +2,9 @@
 // few voxels (6-connected), and replaces the marked samples by the mean of themselves and their neighbours, a
 // fixed number of times, with the unmarked samples held: heat that flows inside the mark only.
 //
-// Marks are bits, one byte per row of a brick. Bricks that hold marked samples get two sets of samples, and a
-// diffusion step goes from one set to the other, row by row. What was there is left as it is, since it may be
-// shared with others.
+// Marks are bits, one byte per row of a brick. Bricks that hold marked samples get a second set of samples,
+// and a diffusion step goes from one set to the other, row by row. Where the first is shared with others, it
+// is copied before.
 //
 // Limits: a jump that is smaller than what noise of the layer's frequency can do over one voxel is not seen,
 // and stays.
@@ -16,9 +16,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "nephele/modeling/base/error.h"
@@ -219,38 +217,38 @@ struct BitsAsFloats {
 };
 constexpr BitsAsFloats kBitsAsFloats;
 
-/// The bricks that hold marked samples, and two sets of samples of each beside those of the grid.
+/// The bricks that hold marked samples, and two sets of samples of each: those of the grid and others.
 class Heat {
  public:
-  Heat(const BrickSamples& samples, const Neighbours& neighbours, const Mask& mask)
-      : neighbours_(neighbours), mask_(mask), current_(samples.pool) {
-    for (std::size_t b = 1; b < current_.size(); ++b)
+  Heat(BrickSamples& samples, const Neighbours& neighbours, const Mask& mask)
+      : neighbours_(neighbours), mask_(mask) {
+    for (std::size_t b = 1; b < samples.pool.size(); ++b)
       if (!mask.isEmpty(b)) bricks_.push_back(b);
-    for (detail::SampleStore& set : sets_)
-      set = detail::SampleStore(bricks_.size() * std::size_t(BrickSamples::kCount));
+    if (samples.areShared) samples.own(bricks_);
+    current_ = samples.pool;
+    others_ = detail::SampleStore(bricks_.size() * std::size_t(BrickSamples::kCount));
+    for (std::size_t i = 0; i < bricks_.size(); ++i)
+      next_.push_back(others_.data() + i * std::size_t(BrickSamples::kCount));
   }
 
   void diffuse(int steps, const Progress& progress) {
-    for (; steps > 0; --steps) {
+    for (int step = 0; step < steps; ++step) {
       progress.check();
-      float* next = sets_[1].data();
-      const auto nextOf = [&](std::size_t i) { return next + i * std::size_t(BrickSamples::kCount); };
       parallelFor(bricks_.size(), kBricksPerPiece, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) diffuse(bricks_[i], nextOf(i));
+        for (std::size_t i = begin; i < end; ++i) diffuse(bricks_[i], next_[i]);
       });
-      for (std::size_t i = 0; i < bricks_.size(); ++i) current_[bricks_[i]] = nextOf(i);
-      std::swap(sets_[0], sets_[1]);
+      for (std::size_t i = 0; i < bricks_.size(); ++i) std::swap(current_[bricks_[i]], next_[i]);
     }
   }
 
-  /// Moves the result into the grid.
+  /// Leaves the result in the grid's own samples.
   void store(BrickSamples& samples) {
-    samples.pool = std::move(current_);
-    samples.stores.push_back({std::move(sets_[0]), std::numeric_limits<int>::max()});
     parallelFor(bricks_.size(), kBricksPerPiece, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        samples.ranges[bricks_[i]] =
-            rangeOfSamples({samples.pool[bricks_[i]], std::size_t(BrickSamples::kCount)});
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t b = bricks_[i];
+        if (current_[b] != samples.pool[b]) std::copy_n(current_[b], BrickSamples::kCount, samples.pool[b]);
+        samples.ranges[b] = rangeOfSamples({samples.pool[b], std::size_t(BrickSamples::kCount)});
+      }
     });
   }
 
@@ -333,10 +331,9 @@ class Heat {
   const Neighbours& neighbours_;
   const Mask& mask_;
   std::vector<std::size_t> bricks_;
-  /// The samples of every pool brick.
-  std::vector<float*> current_;
-  /// Those of the bricks in `bricks_` after the last step, if there was one, and room for the next.
-  std::array<detail::SampleStore, 2> sets_;
+  /// The samples of every pool brick, and the other samples of those in `bricks_`.
+  std::vector<float*> current_, next_;
+  detail::SampleStore others_;
 };
 
 }  // namespace

@@ -30,8 +30,8 @@ struct MedialSmoothing {
 /// samples, their own or in their borders, are to lose the sign: a change of sign across a jump is no crease,
 /// and interpolating it would cut a false one. Samples that are exactly 0 lie outside the band; they neither
 /// count as jumps nor conduct. Ranges are up to date afterwards. Each pool brick but brick 0 must stand at
-/// one position, and brick 0 be 0; bricks that change get samples of their own, so that they may share some.
-/// All cores; the same bits at any thread count.
+/// one position, and brick 0 be 0; samples that are shared stay as they are. All cores; the same bits at any
+/// thread count.
 /// @throws Error if jump is not > 0 or a count is negative; Cancelled.
 MedialSmoothing smoothMedialJumps(detail::BrickSamples& signedDisplacement,
                                   const MedialSmoothingOptions& options, const Progress& progress = silent());

@@ -35,12 +35,29 @@ void BrickSamples::append(const std::vector<Vec3i>& bricks) {
   Store store{SampleStore(bricks.size() * kCount), bricks[0].z};
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     store.lastZ = std::max(store.lastZ, bricks[i].z);
-    appendShared(bricks[i], store.samples.data() + i * kCount, {});
+    place(bricks[i], store.samples.data() + i * kCount, {});
   }
   stores.push_back(std::move(store));
 }
 
 void BrickSamples::appendShared(const Vec3i& brick, float* samples, const Interval& range) {
+  place(brick, samples, range);
+  areShared = true;
+}
+
+void BrickSamples::own(const std::vector<std::size_t>& bricks) {
+  SampleStore store(bricks.size() * kCount);
+  parallelFor(bricks.size(), kBricksPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      float* copy = store.data() + i * kCount;
+      std::copy_n(pool[bricks[i]], kCount, copy);
+      pool[bricks[i]] = copy;
+    }
+  });
+  stores.push_back({std::move(store), std::numeric_limits<int>::max()});
+}
+
+void BrickSamples::place(const Vec3i& brick, float* samples, const Interval& range) {
   table[brick] = std::int32_t(pool.size());
   placed.push_back({std::int32_t(pool.size()), brick});
   pool.push_back(samples);
@@ -66,8 +83,12 @@ void BrickSamples::separate() {
     brick.pool -= std::int32_t(constants - 1);
     table[brick.brick] = brick.pool;
   }
-  for (std::size_t i = 0; i < source.size(); ++i)
-    appendShared(bricks[i], sources[source[i]], sourceRanges[source[i]]);
+  const std::size_t first = pool.size();
+  append(bricks);
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    std::copy_n(sources[source[i]], kCount, pool[first + i]);
+    ranges[first + i] = sourceRanges[source[i]];
+  }
 }
 
 std::uint32_t neighboursReadAround(int sample) {

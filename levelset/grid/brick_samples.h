@@ -59,8 +59,10 @@ struct BrickSamples {
   float background = 0.0f;
   /// Indices into the pool. Pool brick 0 is all background.
   FlatBrickTable table;
-  /// kCount samples of each, x fastest; several bricks may share theirs.
+  /// kCount samples of each, x fastest. Bricks of nothing but the background may share those of brick 0.
   std::vector<float*> pool;
+  /// Whether others have samples of this, too, so that they must not be written to.
+  bool areShared = false;
   /// Of those samples.
   std::vector<Interval> ranges;
   /// The bricks that stand at a position of their own, the last of the pool; the others are constants.
@@ -76,11 +78,15 @@ struct BrickSamples {
 
   /// Appends bricks whose samples are yet to be written, in one store, at the end of the pool.
   void append(const std::vector<Vec3i>& bricks);
-  /// Appends a brick whose samples are those of another, here or elsewhere, which must outlive it.
+  /// Appends a brick whose samples are those of others, which must outlive it.
   void appendShared(const Vec3i& brick, float* samples, const Interval& range);
-  /// Gives every position but those of pool brick 0 a brick of its own; those of a constant share its
-  /// samples.
+  /// Gives some bricks of the pool samples of their own, the same as before.
+  void own(const std::vector<std::size_t>& bricks);
+  /// Gives every position but those of pool brick 0 a brick of its own.
   void separate();
+
+ private:
+  void place(const Vec3i& brick, float* samples, const Interval& range);
 };
 
 /// `bake` up to the samples. Their order is by z first, in steps of 8 bricks.

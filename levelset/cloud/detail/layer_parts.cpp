@@ -8,8 +8,8 @@
 namespace nephele::detail {
 namespace {
 
-/// The parts of others have at least this thickness, in bricks, and about this many positions. Thicker parts
-/// copy less from their neighbours.
+/// The parts of others have at least this thickness, in bricks, and about this many positions. Of thicker
+/// parts less is smoothed once more beside its neighbours; thinner ones take less memory.
 constexpr int kPartBricks = 4;
 constexpr double kPartPositions = 1 << 15;
 

@@ -9,6 +9,7 @@
 
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/cloud/cloud_density.h"
+#include "nephele/levelset/cloud/kept_layers.h"
 #include "nephele/levelset/cloud/medial_smoothing.h"
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/grid/grid_field.h"
@@ -341,6 +342,39 @@ TEST(CumuloGrids, StopsWhenCancelled) {
       Cancelled);
 }
 
+TEST(KeptLayers, AreThoseOnCoarseGrids) {
+  // Of a period of the last layer 1 / (32 voxel) = 16 voxels: layers before it have 16 samples to a wave,
+  // which are 32, 64, 128 and 256 along a unit box, in (4, 8, 16, 32)^3 bricks, of which 4096 are the most.
+  const auto layers = cumuloLayers({.layers = 5, .amplitude = 0.02f, .frequency = 2, .lacunarity = 2});
+  const float voxel = 1.0f / 512;
+  EXPECT_FLOAT_EQ(cumuloVoxelSize(layers, 2, voxel), 1.0f / 128);
+  EXPECT_EQ(KeptLayers::count(layers, {{0, 0, 0}, {1, 1, 1}}, voxel), 3u);
+  EXPECT_EQ(KeptLayers::count(layers, {{0, 0, 0}, {1, 1, 0.5f}}, voxel), 3u);
+  EXPECT_EQ(KeptLayers::count(layers, {{0, 0, 0}, {1, 1, 1.01f}}, voxel), 2u);
+  // The last one is not kept, however coarse it is.
+  EXPECT_EQ(KeptLayers::count(layers, {{0, 0, 0}, {0.1f, 0.1f, 0.1f}}, voxel), 4u);
+}
+
+TEST(KeptLayers, ReachFartherForHigherOnesAfterThem) {
+  const auto reachOf = [](float last, std::size_t index, std::size_t count) {
+    auto layers = cumuloLayers({.layers = 4, .amplitude = 0.02f, .frequency = 2, .roughness = 0.5f});
+    layers[3].amplitude = ScalarField(last);
+    return std::pair{KeptLayers::reach(layers, index, 1e-4f, count), displacementBound(layers, index)};
+  };
+  for (const std::size_t count : {0u, 1u, 3u})
+    for (std::size_t index = 0; index < 4; ++index) {
+      const auto [reach, bound] = reachOf(0.0025f, index, count);
+      if (index >= count)
+        EXPECT_EQ(reach, bound);
+      else
+        EXPECT_GE(reach, bound);
+      // In steps of a quarter of its own height.
+      EXPECT_LE(reach, 1.25f * 1.25f * bound);
+    }
+  EXPECT_EQ(reachOf(0.0026f, 0, 3).first, reachOf(0.0027f, 0, 3).first);
+  EXPECT_NE(reachOf(0.0026f, 3, 3).first, reachOf(0.0027f, 3, 3).first);
+}
+
 /// The samples of a field with every brick at a place of its own, as smoothing takes them.
 detail::BrickSamples samplesOf(const ScalarField& field) {
   detail::BrickSamples samples = detail::bakeSamples(
@@ -390,6 +424,33 @@ TEST(MedialSmoothing, KeepsSignsAfterAnOddNumberOfSteps) {
   smoothMedialJumps(samples, {.jump = 1.0f, .dilation = 1, .steps = 1});
   EXPECT_FLOAT_EQ(sampleAt(samples, {-1, 2, 2}), -9.0f / 7);
   EXPECT_FLOAT_EQ(sampleAt(samples, {0, 2, 2}), 19.0f / 7);
+}
+
+TEST(MedialSmoothing, LeavesSharedSamplesAsTheyAre) {
+  const ScalarField step = mask(plane({-0.05f, 0, 0}, {1, 0, 0})) * 2.0f + 1.0f;
+  detail::BrickSamples alone = samplesOf(step);
+  const detail::BrickSamples before = samplesOf(step), others = samplesOf(step);
+  detail::BrickSamples shared = samplesOf(step);
+  for (const PlacedBrick& brick : others.placed) {
+    const auto pool = std::size_t(brick.pool);
+    shared.appendShared(brick.brick, others.pool[pool], others.ranges[pool]);
+  }
+  // Those that were there stand nowhere any more.
+  shared.placed.erase(shared.placed.begin(), shared.placed.begin() + std::ptrdiff_t(others.placed.size()));
+  smoothMedialJumps(alone, {.jump = 1.0f});
+  smoothMedialJumps(shared, {.jump = 1.0f});
+  std::size_t changed = 0;
+  for (const PlacedBrick& brick : others.placed) {
+    const auto pool = std::size_t(brick.pool), place = std::size_t(shared.table.at(brick.brick));
+    const auto isEqual = [&](const float* a, const float* b) {
+      return std::equal(a, a + detail::BrickSamples::kCount, b);
+    };
+    EXPECT_TRUE(isEqual(others.pool[pool], before.pool[pool]));
+    EXPECT_TRUE(isEqual(shared.pool[place], alone.pool[pool]));
+    EXPECT_EQ(shared.ranges[place], alone.ranges[pool]);
+    changed += !isEqual(alone.pool[pool], before.pool[pool]);
+  }
+  EXPECT_GT(changed, 0u);
 }
 
 TEST(MedialSmoothing, DropsTheSignAcrossAJump) {
