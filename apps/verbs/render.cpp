@@ -55,17 +55,16 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   // Keys take the contents of all files.
   const PictureStages::Keys keys =
       run.pictureStages ? pictureKeys(*options.app, scene, picture, run) : PictureStages::Keys{};
-  PictureStages alone;
-  PictureStages& stages = run.pictureStages ? *run.pictureStages : alone;
-  std::shared_ptr<const RenderVolume> volume = keys.volume.empty() ? nullptr : stages.volumeAt(keys);
+  const auto stages = run.pictureStages ? run.pictureStages : std::make_shared<PictureStages>();
+  std::shared_ptr<const RenderVolume> volume = keys.volume.empty() ? nullptr : stages->volumeAt(keys);
   std::shared_ptr<RenderVolume> made;
   if (!volume) {
     // Two volumes never stand side by side.
-    stages.forget();
+    stages->forget();
     volume = made = std::make_shared<RenderVolume>(scene.volume(picture, run));
-    stages.volume(keys.volume, volume);
+    stages->volume(keys.volume, volume);
   }
-  picture = picture.resolved(*volume, run, stages.isLit(keys) ? &stages.lit()->light : nullptr);
+  picture = picture.resolved(*volume, run, stages->isLit(keys) ? &stages->lit()->light : nullptr);
   scene.addTo(picture, *volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();
   if (!scene.holdout.empty())
@@ -75,7 +74,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   picture.light.writeShadows(*volume, picture.lights, picture.medium, run);
   if (made && !picture.needsSamples()) made->giveUpSamples();
   LivePicture live(picture.displayServer, files.name(), picture.render);
-  RenderResult result = pictureOf(picture, *volume, camera, keys, stages, run);
+  RenderResult result = pictureOf(picture, *volume, camera, keys, *stages, run);
   picture.addSky(result.image, camera, picture.lights);
   run.begin("write");
   files.write(result, camera, picture.screen, picture.metadata(run));
