@@ -47,6 +47,24 @@ describe("a cloud", () => {
     await look.screenshot("open_dark");
   });
 
+  test("is finished only once its last picture is seen, however long that takes to decode", kLimit, async (t) => {
+    const { look } = await cloud(t);
+    await look.tab.evaluate(() => {
+      const decode = window.createImageBitmap;
+      window.createImageBitmap = async (...all) => {
+        await new Promise((done) => setTimeout(done, 1000));
+        return decode(...all);
+      };
+    });
+    const revision = Number(await look.tab.$eval("#picture", (canvas) => canvas.dataset.revision));
+    await look.type("#render-exposure", "2");
+    await look.finished();
+    assert.ok(Number(await look.tab.$eval("#picture", (canvas) => canvas.dataset.revision)) > revision);
+    const bright = await look.small();
+    await new Promise((done) => setTimeout(done, 1500));
+    assert.equal(difference(bright, await look.small()), 0);
+  });
+
   test("is orbited by a drag, and the picture follows", kLimit, async (t) => {
     const { look } = await cloud(t);
     const before = await look.small();

@@ -33,6 +33,8 @@ startTheme(() => picture.draw());
 let isLoaded = false;
 let fragment = "";
 let settled = 0;
+// Ends once the picture that came last is on the canvas, or was overtaken.
+let shown = Promise.resolve();
 
 function sizeOfPicture() {
   const chosen = /^(\d+)x(\d+)$/.exec(byId("size").value);
@@ -99,7 +101,7 @@ function take({ message, payload }) {
   const isCurrent = () => sender.isCurrent(message.revision, () => take({ message, payload }));
   switch (message.type) {
     case "picture":
-      if (isCurrent()) takePicture(message, payload);
+      if (isCurrent()) shown = takePicture(message, payload);
       break;
     case "progress":
       if (!isCurrent()) break;
@@ -107,11 +109,7 @@ function take({ message, payload }) {
       progress(message.fraction);
       break;
     case "idle":
-      if (!isCurrent()) break;
-      sender.seen(message.revision);
-      settle();
-      byId("stage-text").textContent = `Finished in ${seconds(message.seconds)}`;
-      if (!camera.isDragging) announce(`Picture finished in ${seconds(message.seconds)}.`);
+      if (isCurrent()) shown.finally(() => isCurrent() && finish(message));
       break;
     case "error":
       if (!isCurrent()) break;
@@ -148,6 +146,13 @@ async function takePicture(message, payload) {
   if (settled !== message.revision) byId("stage-text").textContent = message.final ? "Final" : labelOf(message.stage);
   dome.update(message.camera);
   listLayers(message.layers);
+}
+
+function finish(message) {
+  sender.seen(message.revision);
+  settle();
+  byId("stage-text").textContent = `Finished in ${seconds(message.seconds)}`;
+  if (!camera.isDragging) announce(`Picture finished in ${seconds(message.seconds)}.`);
 }
 
 function takeFile({ path, state, message }) {
