@@ -26,6 +26,9 @@ include(pkg_config)
 
 if(NEPHELE_BUILD_APPS)
   install(TARGETS nephele RUNTIME COMPONENT program)
+  if(TARGET nephele_openvdb)
+    install(TARGETS nephele_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/nephele COMPONENT program)
+  endif()
   if(TARGET nephele_manual)
     set(manual ${PROJECT_BINARY_DIR}/apps/manual)
     install(DIRECTORY ${manual}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program

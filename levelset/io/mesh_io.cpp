@@ -20,6 +20,7 @@
 #include <memory>
 #include <system_error>
 
+#include "nephele/levelset/io/detail/file_extension.h"
 #include "nephele/levelset/io/detail/mesh_io_private.h"
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
@@ -195,14 +196,8 @@ void requireWritable(const Mesh& mesh, bool asTrianglesOfFloats) {
           fmt::format("face {} has {} corners; files hold faces of 3 and more", f, mesh.face(f).size()));
 }
 
-std::string lowerExtension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
-}
-
 Mesh parse(const detail::MeshFile& file) {
-  const std::string extension = lowerExtension(file.path);
+  const std::string extension = detail::lowerExtension(file.path);
   if (file.bytes.empty()) file.fail("the file is empty");
   if (file.bytes.starts_with("version https://git-lfs"))
     file.fail("is a Git LFS pointer, not the mesh itself; fetch it with 'git lfs pull'");
@@ -221,7 +216,7 @@ Mesh parse(const detail::MeshFile& file) {
 
 bool isMeshFile(const std::string& path) {
   constexpr const char* kExtensions[] = {".obj", ".ply", ".stl", ".off", ".gltf", ".glb"};
-  return std::ranges::find(kExtensions, lowerExtension(path)) != std::end(kExtensions);
+  return std::ranges::find(kExtensions, detail::lowerExtension(path)) != std::end(kExtensions);
 }
 
 Mesh readMesh(const std::string& path) {
@@ -243,8 +238,8 @@ Mesh readMesh(const std::string& path) {
 }
 
 void writeMesh(const std::string& path, const Mesh& mesh) {
-  namingFile(path, [&] { requireWritable(requireValid(mesh), lowerExtension(path) == ".stl"); });
-  const std::string extension = lowerExtension(path);
+  namingFile(path, [&] { requireWritable(requireValid(mesh), detail::lowerExtension(path) == ".stl"); });
+  const std::string extension = detail::lowerExtension(path);
   void (*write)(std::FILE*, const Mesh&) = extension == ".obj"   ? detail::writeObj
                                            : extension == ".ply" ? detail::writePly
                                            : extension == ".stl" ? detail::writeStl

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "nephele/levelset/io/detail/file_extension.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
 #include "nephele/levelset/io/detail/vdb_identifier.h"
@@ -26,12 +27,6 @@ namespace {
   std::replace_if(
       reason.begin(), reason.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
   throw Error(fmt::format("{}: {}", path, reason));
-}
-
-std::string lowerExtension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
 }
 
 void checkReadable(const std::string& path) {
@@ -77,8 +72,8 @@ std::vector<openvdb::GridBase::Ptr> readGrids(const std::string& path, const det
   }
   checkReadable(path);
   return translateReadErrors(path, [&] {
-    return lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path, wanted)
-                                           : detail::readOpenVdb(path, wanted);
+    return detail::lowerExtension(path) == ".nvdb" ? detail::readNanoVdb(path, wanted)
+                                                   : detail::readOpenVdb(path, wanted);
   });
 }
 
@@ -108,11 +103,6 @@ void requireReadableTexts(const std::string& path, const openvdb::GridBase& grid
 }
 
 }  // namespace
-
-bool isVolumeFile(const std::string& path) {
-  const std::string extension = lowerExtension(path);
-  return extension == ".vdb" || extension == ".nvdb";
-}
 
 std::vector<VdbGrid> readVdbFile(const std::string& path) {
   return wrapped(readGrids(path, [](const auto&, const auto&) { return true; }));

@@ -38,7 +38,7 @@ compile "$folder/readme.cpp" "$folder/readme" nephele-render
 (cd "$folder" && ./readme && test -s cloud.vdb) || fail "the sample of the README writes nothing"
 
 # Module and program run from where they were installed.
-"$prefix/bin/nephele" --version >/dev/null
+"$prefix/bin/nephele" levelset "$root/data/sphere_uv.obj" --resolution 16 -o "$folder/levels.vdb" >/dev/null
 if module=$(find "$prefix" -name '_nephele*.so' | grep .); then
   PYTHONPATH=$(dirname "$(dirname "$module")") /usr/bin/python3 -c 'import nephele; assert nephele.sphere((0, 0, 0), 1)((0, 0, 0)) == 1'
 fi

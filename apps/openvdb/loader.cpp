@@ -1,0 +1,144 @@
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "apps/openvdb/functions.h"
+#include "nephele/modeling/base/error.h"
+
+namespace nephele {
+namespace {
+
+// Beside the program where it was built; where it is installed, among the libraries.
+std::string pathOfModule() {
+  std::error_code ignored;
+  const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path(),
+                              beside = folder / NEPHELE_OPENVDB_MODULE;
+  if (std::filesystem::exists(beside, ignored)) return beside.string();
+  return (folder / NEPHELE_MODULES_FROM_PROGRAM / NEPHELE_OPENVDB_MODULE).lexically_normal().string();
+}
+
+// Of the module's libraries first what they need themselves: else each of those symbols is looked for in some
+// sixty libraries of the program before. Sanitizers do not allow it.
+#ifdef NEPHELE_SANITIZED
+constexpr int kBinding = RTLD_NOW | RTLD_LOCAL;
+#else
+constexpr int kBinding = RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND;
+#endif
+
+const apps::OpenVdbFunctions& functions() {
+  static const apps::OpenVdbFunctions& loaded = []() -> const apps::OpenVdbFunctions& {
+    void* const module = dlopen(pathOfModule().c_str(), kBinding);
+    const void* const found = module ? dlsym(module, "nepheleOpenVdbFunctions") : nullptr;
+    if (!found)
+      throw Error(fmt::format("the part of the program that knows VDB cannot be loaded, install it again: {}",
+                              dlerror()));
+    return *static_cast<const apps::OpenVdbFunctions*>(found);
+  }();
+  return loaded;
+}
+
+}  // namespace
+
+std::vector<VdbGrid> readVdbFile(const std::string& path) {
+  return functions().readVdbFile(path);
+}
+
+std::vector<VdbGrid> readVdbHeaders(const std::string& path) {
+  return functions().readVdbHeaders(path);
+}
+
+VdbGrid readScalarGrid(const std::string& path, const std::string& name) {
+  return functions().readScalarGrid(path, name);
+}
+
+std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string& name) {
+  return functions().readVectorGrid(path, name);
+}
+
+void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
+                  const std::map<std::string, std::string>& metadata) {
+  functions().writeVdbFile(path, grids, metadata);
+}
+
+VdbGridInfo describe(const VdbGrid& grid) {
+  return functions().describe(grid);
+}
+
+std::string listOf(const std::vector<VdbGrid>& grids) {
+  return functions().listOf(grids);
+}
+
+VdbGridLabel labelOf(const VdbGrid& grid) {
+  return functions().labelOf(grid);
+}
+
+std::optional<std::string> metadataOf(const VdbGrid& grid, const std::string& key) {
+  return functions().metadataOf(grid, key);
+}
+
+void copyMetadata(const VdbGrid& from, VdbGrid& to) {
+  functions().copyMetadata(from, to);
+}
+
+Box activeBox(const VdbGrid& grid) {
+  return functions().activeBox(grid);
+}
+
+std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid) {
+  return functions().vectorComponents(grid);
+}
+
+VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid) {
+  return functions().toVectorVoxels(grid);
+}
+
+VdbValues valuesOf(const VdbGrid& grid) {
+  return functions().valuesOf(grid);
+}
+
+VdbGrid moved(const VdbGrid& grid, const Similarity& by) {
+  return functions().moved(grid, by);
+}
+
+std::shared_ptr<BrickGrid> toBricks(const VdbGrid& grid, const BrickSink& made) {
+  return functions().toBricks(grid, made);
+}
+
+VdbGrid toVdb(const BrickGrid& bricks, const VdbGridLabel& label) {
+  return functions().bricksToVdb(bricks, label);
+}
+
+VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label) {
+  return functions().vectorsToVdb(grids, label);
+}
+
+VdbGrid toVdb(VoxelGrid<float> voxels, const VdbGridLabel& label) {
+  return functions().voxelsToVdb(std::move(voxels), label);
+}
+
+VdbGrid toVdb(VoxelGrid<Vec3f> voxels, const VdbGridLabel& label) {
+  return functions().vectorVoxelsToVdb(std::move(voxels), label);
+}
+
+Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
+  return functions().adaptiveMesh(grid, isovalue, adaptivity);
+}
+
+ScalarField sweptDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,
+                          const Progress& progress) {
+  return functions().sweptDistance(level, spec, band, progress);
+}
+
+ScalarField rebuiltDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,
+                            const Progress& progress) {
+  return functions().rebuiltDistance(level, spec, band, progress);
+}
+
+VoxelGrid<float> detail::floodedBand(const Mesh& mesh, const BandOptions& options, const Progress& progress) {
+  return functions().floodedBand(mesh, options, progress);
+}
+
+}  // namespace nephele

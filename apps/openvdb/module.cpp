@@ -1,0 +1,27 @@
+#include "apps/openvdb/functions.h"
+
+extern "C" __attribute__((visibility("default")))
+const nephele::apps::OpenVdbFunctions nepheleOpenVdbFunctions{.readVdbFile = &nephele::readVdbFile,
+                                                              .readVdbHeaders = &nephele::readVdbHeaders,
+                                                              .readScalarGrid = &nephele::readScalarGrid,
+                                                              .readVectorGrid = &nephele::readVectorGrid,
+                                                              .writeVdbFile = &nephele::writeVdbFile,
+                                                              .describe = &nephele::describe,
+                                                              .listOf = &nephele::listOf,
+                                                              .labelOf = &nephele::labelOf,
+                                                              .metadataOf = &nephele::metadataOf,
+                                                              .copyMetadata = &nephele::copyMetadata,
+                                                              .activeBox = &nephele::activeBox,
+                                                              .vectorComponents = &nephele::vectorComponents,
+                                                              .toVectorVoxels = &nephele::toVectorVoxels,
+                                                              .valuesOf = &nephele::valuesOf,
+                                                              .moved = &nephele::moved,
+                                                              .toBricks = &nephele::toBricks,
+                                                              .bricksToVdb = &nephele::toVdb,
+                                                              .vectorsToVdb = &nephele::toVdb,
+                                                              .voxelsToVdb = &nephele::toVdb,
+                                                              .vectorVoxelsToVdb = &nephele::toVdb,
+                                                              .adaptiveMesh = &nephele::adaptiveMesh,
+                                                              .sweptDistance = &nephele::sweptDistance,
+                                                              .rebuiltDistance = &nephele::rebuiltDistance,
+                                                              .floodedBand = &nephele::detail::floodedBand};
