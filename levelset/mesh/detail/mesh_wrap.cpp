@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -44,8 +45,12 @@ struct WrapVisitor : CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
 Mesh wrapped(const Mesh& triangles, double alpha, double offset, const Progress& progress) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Point = Kernel::Point_3;
+  // Coordinates that differ by far less than anything that is wrapped make tetrahedra so flat that the centres
+  // of their spheres are beyond a double, at which exact arithmetic ends the process.
+  const double quantum = std::ldexp(1.0, std::ilogb(offset) - 30);
+  const auto rounded = [=](double x) { return std::nearbyint(x / quantum) * quantum; };
   std::vector<Point> points;
-  for (const Vec3d& p : triangles.positions) points.emplace_back(p.x, p.y, p.z);
+  for (const Vec3d& p : triangles.positions) points.emplace_back(rounded(p.x), rounded(p.y), rounded(p.z));
   std::vector<std::array<std::size_t, 3>> faces;
   for (std::size_t f = 0; f < triangles.faceCount(); ++f) {
     const auto face = triangles.face(f);
