@@ -13,6 +13,7 @@
 #include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
 #include "nephele/render/light/detail/lines_of_sight.h"
+#include "nephele/render/light/detail/sending_cells.h"
 #include "nephele/render/light/scattered_light.h"
 
 namespace nephele {
@@ -30,8 +31,8 @@ struct ScatteredLight::Sender {
 
   bool isSeenAs(const ScatteredLight& other) const;
   float sky(const Vec3f& way) const;
-  template <class Away, class Tell>
-  std::vector<float> sources(const Away& away, const Tell& tell) const;
+  template <class Tell>
+  std::vector<float> sources(const Vec3f& eye, bool isPlace, const Tell& tell) const;
   static void send(std::span<const ScatteredLight* const> lights, const Viewpoint& viewpoint,
                    std::span<std::vector<float>* const> sent);
 };
@@ -81,10 +82,11 @@ void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights,
   std::vector<detail::Met> met(cells);
   std::vector<std::vector<float>> own;
   for (std::size_t k = 0; k != lights.size(); ++k)
-    own.push_back(Sender{*lights[k]}.sources(away, [&](std::size_t i, float all) {
-      met[i].values[0] = any.density_[i];
-      met[i].values[1 + k] = all;
-    }));
+    own.push_back(Sender{*lights[k]}.sources(viewpoint.place ? eye : forward, viewpoint.place.has_value(),
+                                             [&](std::size_t i, float all) {
+                                               met[i].values[0] = any.density_[i];
+                                               met[i].values[1 + k] = all;
+                                             }));
   for (std::vector<float>* values : sent) values->resize(cells);
   const detail::SightLattice lattice{any.size_, met.data(), any.depthPerDensity_,
                                      std::min(kCutoff / std::max(1 - any.share_, kCutoff), kLargestCutoff)};
@@ -130,29 +132,36 @@ float ScatteredLight::Sender::sky(const Vec3f& way) const {
 }
 
 // What nodes send without the beam; calls tell(node, what L is made of there).
-template <class Away, class Tell>
-std::vector<float> ScatteredLight::Sender::sources(const Away& away, const Tell& tell) const {
+template <class Tell>
+std::vector<float> ScatteredLight::Sender::sources(const Vec3f& eye, bool isPlace, const Tell& tell) const {
   const int degree = int(light.phase_.size()) - 1;
-  const float ofBeam = light.share_ < 1 ? (1 - light.smoothShare_) / (1 - light.share_) : 0.0f;
-  std::vector<float> own(light.beam_.size());
-  float beamWay[detail::kMostMoments] = {};
+  float weights[detail::kMostDegree + 1], beamWay[detail::kMostMoments] = {1.0f};
+  for (int l = 0; l <= degree; ++l) weights[l] = light.albedo_ * light.phase_[std::size_t(l)];
   if (light.towards_) detail::harmonics(-*light.towards_, degree, beamWay);
-  light.rows_->forEachCell([&](std::size_t i, std::size_t kept, const Vec3f& node) {
-    float y[detail::kMostMoments], ways[detail::kMostMoments];
-    detail::harmonics(-away(node), degree, y);
-    const float *way = beamWay,
-                *moments = light.moments_.data() + detail::CellRows::momentsAt(kept, light.sky_.size());
-    if (light.place_) detail::harmonics(light.wayOfBeam(node), degree, ways), way = ways;
-    float all = 0, beam = 0;
-    for (int l = 0, m = 0; l <= degree; ++l) {
-      const float weight = light.albedo_ * light.phase_[std::size_t(l)];
-      for (; m != detail::momentCount(l); ++m) {
-        all += weight * y[m] * moments[m * detail::CellRows::kVector];
-        if (m == 0 || light.hasWay()) beam += weight * y[m] * (m == 0 ? 1.0f : way[m]);
+  std::vector<float> own(light.beam_.size());
+  light.rows_->forEachRow([&](int y, int z, const detail::CellRows::Row& row) {
+    detail::SendingCells cells;
+    cells.eye = eye;
+    cells.isEyeAPlace = isPlace;
+    cells.degree = degree;
+    cells.weights = weights;
+    cells.beamWay = beamWay;
+    cells.beamPlace = light.place_ ? &*light.place_ : nullptr;
+    if (light.share_ < 1) cells.ofBeam = (1 - light.smoothShare_) / (1 - light.share_);
+    const std::size_t first =
+        (std::size_t(z) * std::size_t(light.size_.y) + std::size_t(y)) * std::size_t(light.size_.x);
+    for (int x = row.begin; x != row.end; x += detail::CellRows::kVector) {
+      const std::size_t from = first + std::size_t(x);
+      cells.node = Vec3f(Vec3i{x, y, z});
+      cells.moments =
+          light.moments_.data() + detail::CellRows::momentsAt(std::size_t(row.first + x), light.sky_.size());
+      cells.beam = light.beam_.data() + from;
+      detail::send(cells);
+      for (std::size_t n = 0; n != detail::CellRows::kVector; ++n) {
+        own[from + n] = cells.own[n];
+        tell(from + n, cells.all[n]);
       }
     }
-    own[i] = all - beam * light.beam_[i];
-    tell(i, own[i] + ofBeam * beam * light.beam_[i]);
   });
   return own;
 }

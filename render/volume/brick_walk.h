@@ -87,7 +87,8 @@ template <class Visit>
     for (int axis = 0; axis != 3; ++axis) {
       brick[axis] = forward[axis] ? count[axis] - 1 - left[axis] : left[axis];
       const int low = brick[axis] - radius, high = brick[axis] + radius;
-      const int at = int(std::floor((ray.origin[axis] + s * ray.direction[axis]) / size));
+      // Rounded to 0, as what is below it is at the rim anyway.
+      const int at = int((ray.origin[axis] + s * ray.direction[axis]) / size);
       brick[axis] = axis == exit ? (forward[axis] ? high + 1 : low - 1)
                                  : std::clamp(std::clamp(at, low, high), 0, count[axis] - 1);
       if (brick[axis] < 0 || brick[axis] >= count[axis]) return;

@@ -8,26 +8,46 @@
 
 namespace nephele::detail {
 
+const HarmonicFactors& harmonicFactors() {
+  static const HarmonicFactors all = [] {
+    HarmonicFactors factors{};
+    float diagonal = 1, factorials = 1;
+    for (int m = 0; m <= kMostDegree; ++m) {
+      factors.diagonal[m] = diagonal;
+      float ratio = factorials;
+      for (int l = m; l <= kMostDegree; ++l) {
+        const int at = l * l + l + m;
+        factors.norm[at] = std::sqrt(float(2 * l + 1) * ratio * (m > 0 ? 2.0f : 1.0f));
+        factors.ofLast[at] = float(2 * l + 1) / float(l + 1 - m);
+        factors.ofBefore[at] = float(l + m) / float(l + 1 - m);
+        ratio *= float(l + 1 - m) / float(l + 1 + m);
+      }
+      diagonal *= float(2 * m + 1);
+      factorials /= float((2 * m + 1) * (2 * m + 2));
+    }
+    return factors;
+  }();
+  return all;
+}
+
 void harmonics(const Vec3f& way, int degree, float* out) {
-  // Legendre's functions over sin^m, times sin^m cos(m phi) and sin^m sin(m phi), which are polynomials.
-  float cosine = 1, sine = 0, diagonal = 1, factorials = 1;
+  const HarmonicFactors& factors = harmonicFactors();
+  // Times sin^m cos(m phi) and sin^m sin(m phi), which are polynomials.
+  float cosine = 1, sine = 0;
   for (int m = 0; m <= degree; ++m) {
-    float before = 0, value = diagonal, ratio = factorials;
+    float before = 0, value = factors.diagonal[m];
     for (int l = m; l <= degree; ++l) {
-      const float norm = std::sqrt(float(2 * l + 1) * ratio * (m > 0 ? 2.0f : 1.0f)) * value;
-      float* at = out + l * l + l;
-      at[m] = norm * cosine;
-      if (m > 0) at[-m] = norm * sine;
-      const float next = (float(2 * l + 1) * way.z * value - float(l + m) * before) / float(l + 1 - m);
+      const int at = l * l + l;
+      const float norm = factors.norm[at + m] * value;
+      out[at + m] = norm * cosine;
+      if (m > 0) out[at - m] = norm * sine;
+      const float next = factors.ofLast[at + m] * way.z * value - factors.ofBefore[at + m] * before;
       before = value;
       value = next;
-      ratio *= float(l + 1 - m) / float(l + 1 + m);
     }
     const float turned = cosine * way.x - sine * way.y;
     sine = cosine * way.y + sine * way.x;
     cosine = turned;
-    diagonal *= float(2 * m + 1);
-    factorials /= float((2 * m + 1) * (2 * m + 2));
   }
 }
 

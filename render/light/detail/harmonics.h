@@ -21,6 +21,15 @@ constexpr int degreeOf(int moment) {
 /// At a unit vector. Mirrored vectors have values that differ in their signs alone.
 void harmonics(const Vec3f& way, int degree, float* out);
 
+/// What the recurrences of harmonics up to kMostDegree multiply with. Of degree l and order m >= 0, at l l +
+/// l + m: P(l + 1) = ofLast z P(l) - ofBefore P(l - 1) for Legendre's functions over sin^m, which begin with
+/// `diagonal` of m, and what harmonics have them times.
+struct HarmonicFactors {
+  float diagonal[kMostDegree + 1];
+  float ofLast[kMostMoments], ofBefore[kMostMoments], norm[kMostMoments];
+};
+const HarmonicFactors& harmonicFactors();
+
 /// Whether value m of `harmonics` changes its sign with that of the vector along an axis.
 bool isOdd(int m, int axis);
 

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+
+#include "nephele/modeling/base/math.h"
+#include "nephele/render/light/detail/cell_rows.h"
+#include "nephele/render/light/detail/harmonics.h"
+
+namespace nephele::detail {
+
+/// A vector of cells of a row, side by side along the first axis, and what they send to an eye.
+struct SendingCells {
+  /// Of the first cell, in the lattice, as all places and ways are.
+  Vec3f node{};
+  /// Where the eye is, or the way of all rays from it.
+  Vec3f eye{};
+  bool isEyeAPlace = false;
+  /// What scattered light of every degree counts for.
+  int degree = 0;
+  const float* weights = nullptr;
+  /// Moments of the light, see CellRows::momentsAt, and of these what is the beam's in every cell.
+  const float* moments = nullptr;
+  const float* beam = nullptr;
+  /// Harmonics of the beam's way, unless it comes from a place.
+  const float* beamWay = nullptr;
+  const Vec3f* beamPlace = nullptr;
+  /// What of the beam counts as scattered in `all`.
+  float ofBeam = 0;
+
+  /// The light that is sent, without what the beam sends and with its share.
+  alignas(32) float own[CellRows::kVector] = {};
+  alignas(32) float all[CellRows::kVector] = {};
+};
+
+void send(SendingCells& cells);
+
+}  // namespace nephele::detail
