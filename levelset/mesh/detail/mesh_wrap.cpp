@@ -45,8 +45,8 @@ struct WrapVisitor : CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
 Mesh wrapped(const Mesh& triangles, double alpha, double offset, const Progress& progress) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Point = Kernel::Point_3;
-  // Coordinates that differ by far less than anything that is wrapped make tetrahedra so flat that the centres
-  // of their spheres are beyond a double, at which exact arithmetic ends the process.
+  // Coordinates that differ by far less than anything that is wrapped make tetrahedra so flat that the
+  // centres of their spheres are beyond a double, at which exact arithmetic ends the process.
   const double quantum = std::ldexp(1.0, std::ilogb(offset) - 30);
   const auto rounded = [=](double x) { return std::nearbyint(x / quantum) * quantum; };
   std::vector<Point> points;
