@@ -73,6 +73,22 @@ inline Mesh boxMesh(const Vec3d& low, const Vec3d& high) {
   return mesh;
 }
 
+/// An octahedron with corners at distance 1.
+inline Mesh octahedron() {
+  Mesh mesh;
+  mesh.positions = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  for (const auto& t : {std::array<std::uint32_t, 3>{0, 2, 4},
+                        {2, 1, 4},
+                        {1, 3, 4},
+                        {3, 0, 4},
+                        {2, 0, 5},
+                        {1, 2, 5},
+                        {3, 1, 5},
+                        {0, 3, 5}})
+    mesh.addFace(t);
+  return mesh;
+}
+
 /// The cube of edge 2 about the origin.
 inline Mesh cube() {
   return boxMesh({-1, -1, -1}, {1, 1, 1});

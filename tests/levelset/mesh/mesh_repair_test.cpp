@@ -258,29 +258,11 @@ TEST(MeshRepair, SaysThatAWrapOfAnOpenSurfaceIsAShell) {
 TEST(MeshRepair, WrapsWhatLiesNearerTogetherThanNumbersTell) {
   // An octahedron, and in its middle corners that differ by 1e-200 and less: spheres through these have
   // centres beyond a double.
-  Mesh mesh;
-  mesh.positions = {{1, 0, 0},
-                    {-1, 0, 0},
-                    {0, 1, 0},
-                    {0, -1, 0},
-                    {0, 0, 1},
-                    {0, 0, -1},
-                    {1e-200, 3e-300, 5e-310},
-                    {2e-300, 1e-200, 4e-310},
-                    {3e-310, 4e-290, 1e-200}};
-  for (const std::array<std::uint32_t, 3>& face :
-       std::initializer_list<std::array<std::uint32_t, 3>>{{0, 2, 4},
-                                                           {2, 1, 4},
-                                                           {1, 3, 4},
-                                                           {3, 0, 4},
-                                                           {2, 0, 5},
-                                                           {1, 2, 5},
-                                                           {3, 1, 5},
-                                                           {0, 3, 5},
-                                                           {6, 7, 8},
-                                                           {6, 7, 0},
-                                                           {7, 8, 2},
-                                                           {8, 6, 4}})
+  Mesh mesh = test::octahedron();
+  for (const Vec3d& corner :
+       {Vec3d{1e-200, 3e-300, 5e-310}, Vec3d{2e-300, 1e-200, 4e-310}, Vec3d{3e-310, 4e-290, 1e-200}})
+    mesh.positions.push_back(corner);
+  for (const auto& face : {std::array<std::uint32_t, 3>{6, 7, 8}, {6, 7, 0}, {7, 8, 2}, {8, 6, 4}})
     mesh.addFace(face);
   const RepairedMesh solid = repairMesh(mesh, {.mode = Mode::wrap, .wrapAlpha = 0.05, .wrapOffset = 0.01});
   // Between the octahedron and all that is within an offset of 0.02 of it: 4/3, and 0.02 times its area and

@@ -19,24 +19,8 @@ namespace {
 
 using test::topologyOf;
 
-// An octahedron with corners at distance 1.
-Mesh octahedron() {
-  Mesh mesh;
-  mesh.positions = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-  for (const auto& t : {std::array<std::uint32_t, 3>{0, 2, 4},
-                        {2, 1, 4},
-                        {1, 3, 4},
-                        {3, 0, 4},
-                        {2, 0, 5},
-                        {1, 2, 5},
-                        {3, 1, 5},
-                        {0, 3, 5}})
-    mesh.addFace(t);
-  return mesh;
-}
-
 TEST(Subdivision, OctahedronFollowsLoopsRules) {
-  const Mesh once = subdivided(octahedron(), 1);
+  const Mesh once = subdivided(test::octahedron(), 1);
   ASSERT_EQ(once.positions.size(), 18u);
   ASSERT_EQ(once.faceCount(), 32u);
   EXPECT_TRUE(topologyOf(once).isClosedManifold());
@@ -96,9 +80,9 @@ TEST(Subdivision, TextureCoordinatesAndGroupsFollow) {
 }
 
 TEST(Subdivision, RefusesWhatItCannotDo) {
-  EXPECT_EQ(subdivided(octahedron(), 0).faceCount(), 8u);
-  EXPECT_THROW(subdivided(octahedron(), -1), Error);
-  EXPECT_THROW(subdivided(octahedron(), 15), Error);
+  EXPECT_EQ(subdivided(test::octahedron(), 0).faceCount(), 8u);
+  EXPECT_THROW(subdivided(test::octahedron(), -1), Error);
+  EXPECT_THROW(subdivided(test::octahedron(), 15), Error);
   EXPECT_THROW(subdivided(Mesh{}, 1), Error);
   const Mesh touching =
       test::joined(test::boxMesh({0, 0, 0}, {1, 1, 1}), test::boxMesh({1, 1, 1}, {2, 2, 2}));
