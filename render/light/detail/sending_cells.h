@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstddef>
-
 #include "nephele/modeling/base/math.h"
 #include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
@@ -21,7 +19,7 @@ struct SendingCells {
   /// Moments of the light, see CellRows::momentsAt, and of these what is the beam's in every cell.
   const float* moments = nullptr;
   const float* beam = nullptr;
-  /// Harmonics of the beam's way, unless it comes from a place.
+  /// Harmonics of the beam's way, all but the first 0 where it has none, unless it comes from a place.
   const float* beamWay = nullptr;
   const Vec3f* beamPlace = nullptr;
   /// What of the beam counts as scattered in `all`.
@@ -32,6 +30,7 @@ struct SendingCells {
   alignas(32) float all[CellRows::kVector] = {};
 };
 
+/// Sets `own` and `all`.
 void send(SendingCells& cells);
 
 }  // namespace nephele::detail
