@@ -1,10 +1,11 @@
 // Nothing is lost and nothing prefers a side: albedo 1 sends out what came in, and a mirrored cloud in a
 // mirrored sun looks mirrored.
+#include "tests/support/energy.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "nephele/render/light/detail/harmonics.h"
 #include "nephele/render/light/scattered_light.h"
 #include "nephele/render/march/raymarch.h"
 #include "tests/support/density.h"
@@ -14,27 +15,6 @@ namespace {
 
 using test::ball;
 
-constexpr int kPixels = 40;
-constexpr float kWidth = 2.6f;
-
-Image lookFrom(const LitVolume& lit, const Vec3f& from, const char* layer) {
-  Camera::Frame frame;
-  frame.width = frame.height = kPixels;
-  frame.projection = Camera::Projection::orthographic;
-  frame.orthographicWidth = kWidth;
-  const Vec3f up = std::fabs(from.y) > 0.9f ? Vec3f{1, 0, 0} : Vec3f{0, 1, 0};
-  RenderOptions options;
-  options.aovs = {layer};
-  return lit.render(Camera::lookingAt(from * 10.0f, {0, 0, 0}, up, frame), options).image;
-}
-
-double sumOf(const Image& image, const char* channel) {
-  double sum = 0;
-  for (int y = 0; y != kPixels; ++y)
-    for (int x = 0; x != kPixels; ++x) sum += double(image.at(channel, x, y));
-  return sum;
-}
-
 TEST(Energy, WhatTheSunSendsInComesOut) {
   // A ball that does not absorb: what it takes of the sun (its opacity from there) is what all directions
   // get, summed up over the 48 of a quadrature whose error here is below a thousandth.
@@ -43,12 +23,9 @@ TEST(Energy, WhatTheSunSendsInComesOut) {
   for (const float depth : {0.05f, 0.3f, 1.0f, 4.0f, 16.0f}) {
     const Medium medium{depth / 0.1f, {1, 1, 1}, Phase()};
     const LitVolume lit(volume, medium, {{{"sun", towards, {1, 1, 1}}}, {}}, {});
-    const double in = sumOf(lookFrom(lit, towards, "Z"), "A");
-    double out = 0;
-    for (const auto& [way, weight] : detail::levelSymmetric(6))
-      out += 4 * double(kPi) * double(weight) * sumOf(lookFrom(lit, way, "Z"), "R");
+    const double share = test::shareThatComesOut(lit, towards, {{}, 2.6f, 40}, 6);
     // Where voxels are nearly opaque cells are thinned, which softens a ball of ten voxels by one.
-    EXPECT_NEAR(out / in, 1, depth <= 1 ? 0.015 : 0.035) << depth;
+    EXPECT_NEAR(share, 1, depth <= 1 ? 0.015 : 0.035) << depth;
   }
 }
 
