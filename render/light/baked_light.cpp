@@ -10,6 +10,7 @@
 
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/deep_shadow.h"
+#include "nephele/render/light/detail/beam_samples.h"
 #include "nephele/render/light/detail/sky_parts.h"
 #include "nephele/render/volume/finer_density.h"
 
@@ -73,13 +74,15 @@ BakedLight::BakedLight(const RenderVolume& volume, const Medium& itsMedium, cons
   for (const DistantLight& sun : distant) {
     progress.begin("light " + sun.name);
     const bool changes = surfaces || sun.deepShadow || lights.deepTolerance;
+    isOfVolume_.push_back(!changes);
     LightVolume& light =
         suns.emplace_back(shading, sun.direction,
                           LightVolume::Options{.dark = darkColumn(sun.shadow), .coded = !changes}, progress);
     shadowDeeply(volume, sun, light, progress);
     if (surfaces) light.addShade(toShade, surfaces->shadeBox(), sun.direction, columnPerDepth(sun.shadow));
-    scene.suns.push_back(
-        {{nullptr, light.table().data(), light.brickCount()}, {sun.shadow.x, sun.shadow.y, sun.shadow.z}});
+    scene.suns.push_back({{nullptr, light.table().data(), light.brickCount()},
+                          {sun.shadow.x, sun.shadow.y, sun.shadow.z},
+                          light.bend()});
     toSun.emplace_back(light.worldToLattice(), light.firstBrick());
     directions.push_back(normalize(Vec3d(sun.direction)));
   }
@@ -132,7 +135,6 @@ float BakedLight::columnPerDepth(const Vec3f& shadow) const {
 // part as light that has not met anything, so that the slowest part of it is stopped by a share of the
 // extinction.
 float BakedLight::darkColumn(const Vec3f& shadow) const {
-  constexpr float kDarkDepth = 12;
   const float albedo = std::max({meanAlbedo.x, meanAlbedo.y, meanAlbedo.z});
   float least = 1;
   for (int c = 0; c != 3; ++c) least = std::min(least, shadow[c] * scene.extinctionColour[c]);
@@ -327,6 +329,11 @@ ScatteredSource BakedLight::sourceOf(std::size_t light, int colour) const {
   if (light < suns.size()) {
     ScatteredSource result = ScatteredSource::of(suns[light], distant[light].direction);
     result.shadow = distant[light].shadow[colour];
+    if (isOfVolume_[light])
+      result.thinned = [this, towards = distant[light].direction](float most, float dark) {
+        return std::make_shared<const LightVolume>(
+            *source, towards, LightVolume::Options{.dark = dark, .most = most, .coded = true});
+      };
     return result;
   }
   const LocalLight& local = lights.locals[light - suns.size()];

@@ -74,6 +74,8 @@ struct BakedLight {
   // Of the phase function.
   std::vector<float> moments_{1.0f};
   ScatteredLight::Options solver_;
+  // Whether the columns of a distant light are those of the volume's density alone.
+  std::vector<bool> isOfVolume_;
 
   float columnPerDepth(const Vec3f& shadow) const;
   float darkColumn(const Vec3f& shadow) const;

@@ -11,14 +11,11 @@
 // added, so a column jumps from one to the next. Neighbouring bricks repeat the nodes they share, computed by
 // the same sums.
 //
-// Between nodes c is interpolated linearly, which overestimates it where it is curved; nodes hold c less the
-// mean of that over a cell, so that the surface of an opaque cloud, where c curves most, is not too dark.
-// Across the light, c is a sum over slices of densities that are linear between voxels: nodes at the place f
-// between them overestimate the mean of a slice by f (1 - f) / 2 times its second difference, which the
-// weights of the mix take off. Along the light, a cell overestimates by 1/12 of its step times what the
-// density grows by in it. A node takes the mean of the two cells beside it, weighted by the density that they
-// hold, since nothing is seen in an empty one, and a third more: at an edge, where cells differ, a mean
-// leaves the first cell a third of its error.
+// Where density begins c curves most: it grows with the square of the way, and where voxels are opaque all
+// that is seen lies there. So what is interpolated there is sqrt(c^2 + 2 a c), see bentColumn, which is
+// nearly straight. Across the light, c is a sum over slices of densities that are linear between voxels:
+// nodes at the place f between them overestimate the mean of a slice by f (1 - f) / 2 times its second
+// difference, which the weights of the mix take off.
 //
 // Columns only grow. What a brick adds at least follows from its smallest density, so that bricks which lie
 // in the dark as a whole are known before the sweep: in a thick cloud most of them.
@@ -70,6 +67,7 @@ struct LightVolume::Sweep {
   const BrickGrid& grid;
   /// Null where the grid has its samples.
   const CodedBricks* coded;
+  float most;
   int u, v, w;
   float slopeU, slopeV;
   /// World length of a slice along the light, and whether the light is at the upper end of w.
@@ -77,8 +75,8 @@ struct LightVolume::Sweep {
   bool fromAbove;
   int sampleStride[3];
 
-  Sweep(const RenderVolume& volume, const Vec3f& light)
-      : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()) {
+  Sweep(const RenderVolume& volume, const Vec3f& light, float mostDensity)
+      : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()), most(mostDensity) {
     w = 0;
     for (int axis = 1; axis != 3; ++axis)
       if (std::fabs(light[axis]) > std::fabs(light[w])) w = axis;
@@ -108,9 +106,9 @@ struct LightVolume::Sweep {
     for (int bv = brickOf(patch.v); bv <= brickOf(patch.v + kPatch - 1); ++bv)
       for (int bu = brickOf(patch.u); bu <= brickOf(patch.u + kPatch - 1); ++bu) {
         const Interval& range = grid.ranges()[std::size_t(grid.poolIndex(bricks(bu, bv, bw)))];
-        const float least = std::max(range.min, 0.0f), most = std::max(range.max, 0.0f);
-        if (least != most || most != constant.value_or(most)) return std::nullopt;
-        constant = most;
+        const float low = std::clamp(range.min, 0.0f, most), high = std::clamp(range.max, 0.0f, most);
+        if (low != high || high != constant.value_or(high)) return std::nullopt;
+        constant = high;
       }
     return constant;
   }
@@ -180,14 +178,14 @@ struct LightVolume::Sweep {
     };
     const auto [firstU, lastU] = bricksOf(u0, slopeU);
     const auto [firstV, lastV] = bricksOf(v0, slopeV);
-    float least = INFINITY, most = 0;
+    float low = INFINITY, high = 0;
     for (int bv = firstV; bv <= lastV; ++bv)
       for (int bu = firstU; bu <= lastU; ++bu) {
         const Interval& range = grid.ranges()[std::size_t(grid.poolIndex(bricks(bu, bv, bw)))];
-        least = std::min(least, range.min);
-        most = std::max(most, range.max);
+        low = std::min({low, range.min, most});
+        high = std::max(high, std::min(range.max, most));
       }
-    return std::max(least - kBelow * (most - least), 0.0f) * step * float(BrickGrid::kBrick);
+    return std::max(low - kBelow * (high - low), 0.0f) * step * float(BrickGrid::kBrick);
   }
 
   // What four samples in a row count for at the place f between the middle two: linear interpolation, less
@@ -208,7 +206,7 @@ struct LightVolume::Sweep {
     const detail::SliceWeights mix{weights(shiftU - floorU), weights(shiftV - floorV)};
     const float* first =
         patch.samples.data() + (v0 + int(floorV) - 1 - patch.v) * kPitch + (u0 + int(floorU) - 1 - patch.u);
-    detail::mixSlice(first, mix, out);
+    detail::mixSlice(first, mix, most, out);
   }
 };
 
@@ -216,16 +214,18 @@ LightVolume::LightVolume(const RenderVolume& volume, const Vec3f& towards, const
                          const Progress& progress)
     : dark_(options.dark) {
   require(options.dark > 0, fmt::format("light: expected a dark column above 0, got {}", options.dark));
+  require(options.most >= 0, fmt::format("light: expected a density of 0 or more, got {}", options.most));
   require(isFinite(towards) && length(towards) > 0,
           "light: the direction towards it must be finite and not zero");
   const BrickGrid& grid = volume.density();
-  const Sweep sweep(volume, grid.worldToIndex().linear * normalize(towards));
+  const Sweep sweep(volume, grid.worldToIndex().linear * normalize(towards), options.most);
   Mat3f shear;
   shear(0, sweep.u) = shear(1, sweep.v) = shear(2, sweep.w) = 1;
   shear(0, sweep.w) = -sweep.slopeU;
   shear(1, sweep.w) = -sweep.slopeV;
   worldToLattice_ = {shear * grid.worldToIndex().linear, shear * grid.worldToIndex().translation};
   values_.assign(kVolume, 0.0f);
+  bend_ = 0.5f * std::min(volume.typicalDensity(), options.most) * sweep.step;
   if (volume.isEmpty()) return;
 
   makeRoom(findBricks(volume, sweep), options.coded);
@@ -288,7 +288,7 @@ void LightVolume::makeRoom(std::int32_t bricks, bool coded) {
     detail::resizeLarge(values_, std::size_t(bricks) * kVolume);
   for (std::int32_t pool = 0; pool != (dark_ < INFINITY ? 2 : 1); ++pool) {
     std::array<float, kVolume> nodes;
-    nodes.fill(pool == 0 ? 0.0f : dark_);
+    nodes.fill(pool == 0 ? 0.0f : detail::bentColumn(dark_, bend_));
     if (coded)
       coded_.set(pool, nodes.data());
     else
@@ -328,24 +328,25 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic
     return table_[std::size_t(sweep.fromAbove ? brickCount_.z - 1 - n : n) * across + column];
   };
   const auto poolAt = [&](int n) { return isStored(entryAt(n)) ? entryAt(n) : 0; };
+  const float dark = detail::bentColumn(dark_, bend_);
   // Nodes of the brick that is being worked out, before they are coded.
   std::array<float, kVolume> own;
   bool isDark = false;
   const auto codeOwn = [&](std::int32_t& entry) {
     const Interval range = rangeOfSamples(own);
-    isDark = range.min > dark_;
+    isDark = range.min > dark;
     entry = isDark ? 1 : range == Interval::of(0) ? 0 : coded++;
     if (isStored(entry)) coded_.set(entry, own.data());
   };
-  const auto store = [&](int brick, int inside, const detail::SliceNodes& sum, const detail::Slices& at) {
+  const auto store = [&](int brick, int inside, const detail::SliceNodes& sum) {
     float* nodes = values_.empty() ? own.data() : values_.data() + std::size_t(poolAt(brick)) * kVolume;
     nodes += (sweep.fromAbove ? kBrick - inside : inside) * kWidth * kWidth;
-    // Less the mean error of interpolation along the light.
-    detail::storeSlice(sum, at, sweep.step * (4.0f / 3) / 12, nodes);
+    detail::storeSlice(sum, bend_, nodes);
     if (inside == kBrick && values_.empty()) codeOwn(entryAt(brick));
   };
-  detail::SliceNodes sum{}, halfHere{}, halfNext{}, kept[5];
-  detail::Slices at{&kept[0], &kept[1], &kept[2], &kept[3], &kept[4]};
+  detail::SliceNodes sum{}, after, halfHere, halfNext, kept[2];
+  // At a slice and at the next one.
+  detail::SliceNodes *density = &kept[0], *nextDensity = &kept[1];
   Patch patches[2];
   Patch *here = &patches[0], *next = &patches[1];
   detail::forEachFilledRun(brickCount_.z, poolAt, [&](int n, int end) {
@@ -353,10 +354,8 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic
     // or no light.
     const int slices = (end - n) * kBrick;
     int k = (firstBrick_.z + (sweep.fromAbove ? brickCount_.z - n : n)) * kBrick;
-    at.before->fill(0.0f);
-    at.previous->fill(0.0f);
     sweep.load(u0, v0, k, *here);
-    sweep.interpolate(*here, u0, v0, float(k), *at.density);
+    sweep.interpolate(*here, u0, v0, float(k), *density);
     // Behind a dark brick all is dark.
     int finished = n;
     for (int slice = 0; slice <= slices && !isDark; ++slice, k += down) {
@@ -366,19 +365,17 @@ void LightVolume::fillColumn(const Sweep& sweep, std::size_t column, std::atomic
         const float end1 = sweep.step * (1.0f / 6), middle1 = sweep.step * (1.0f / 3);
         sweep.interpolate(*here, u0, v0, middle, halfHere);
         sweep.interpolate(*next, u0, v0, middle, halfNext);
-        sweep.interpolate(*next, u0, v0, float(k + down), *at.next);
-        detail::addSlices(end1, *at.density, *at.next, middle1, halfHere, halfNext, *at.after);
+        sweep.interpolate(*next, u0, v0, float(k + down), *nextDensity);
+        detail::addSlices(end1, *density, *nextDensity, middle1, halfHere, halfNext, after);
       } else {
-        at.after->fill(0.0f);
-        at.next->fill(0.0f);
+        after.fill(0.0f);
+        nextDensity->fill(0.0f);
       }
       const int brick = n + slice / kBrick, inside = slice % kBrick;
-      if (slice > 0 && inside == 0) store(finished++, kBrick, sum, at);
-      if (slice < slices) store(brick, inside, sum, at);
-      detail::addSlice(*at.after, sum);
-      std::swap(at.before, at.after);
-      std::swap(at.previous, at.density);
-      std::swap(at.density, at.next);
+      if (slice > 0 && inside == 0) store(finished++, kBrick, sum);
+      if (slice < slices) store(brick, inside, sum);
+      detail::addSlice(after, sum);
+      std::swap(density, nextDensity);
       std::swap(here, next);
     }
     for (; isDark && finished < end; ++finished) entryAt(finished) = 1;
@@ -405,22 +402,26 @@ void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float>
     if (!BrickBox{{}, brickCount_}.covers(brick)) continue;
     const std::size_t place = BrickBox{{}, brickCount_}.numberOf(brick);
     const Vec3i at = corner - brick * kBrick;
-    if (!isStored(table_[place]))
+    if (!isStored(table_[place])) {
       columns[n] = table_[place] == 0 ? 0.0f : dark_;
-    else if (coded_.isEmpty())
-      columns[n] = trilinear(values_.data() + std::size_t(table_[place]) * kVolume +
-                                 std::size_t((at.z * kWidth + at.y) * kWidth + at.x),
-                             p - Vec3f(cell), kWidth, kWidth * kWidth);
+      continue;
+    }
+    float bent;
+    if (coded_.isEmpty())
+      bent = trilinear(values_.data() + std::size_t(table_[place]) * kVolume +
+                           std::size_t((at.z * kWidth + at.y) * kWidth + at.x),
+                       p - Vec3f(cell), kWidth, kWidth * kWidth);
     else {
       // Codes are interpolated as they are: what they stand for is linear in them.
       const CodedBricks::Entry& entry = coded_.entries()[place];
       const std::uint16_t* first = coded_.codes() + entry.first + (at.z * kWidth + at.y) * kWidth + at.x;
-      columns[n] =
+      bent =
           (trilinear(p - Vec3f(cell),
                      [first](int x, int y, int z) { return float(first[(z * kWidth + y) * kWidth + x]); }) -
            CodedBricks::kZero) *
           entry.unit;
     }
+    columns[n] = detail::unbentColumn(bent, bend_);
   }
 }
 

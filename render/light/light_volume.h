@@ -17,17 +17,24 @@
 namespace nephele {
 
 namespace detail {
-struct SliceNodes;
-struct Slices;
+/// What nodes of a LightVolume hold of a column c >= 0: sqrt(c^2 + 2 a c). Where density begins in a straight
+/// rise over a voxel, c grows with the square of the way and this with the way itself; behind it, it is c +
+/// a, if `bend`, a, is half of what a voxel adds.
+inline float bentColumn(float column, float bend) {
+  return std::sqrt(column * (column + 2 * bend));
+}
+inline float unbentColumn(float bent, float bend) {
+  return std::sqrt(bent * bent + bend * bend) - bend;
+}
 }  // namespace detail
 
 /// How much density lies between every point of a volume and a distant light, on a lattice whose third axis
 /// runs along the light.
 ///
 /// Holds  c(x) = integral of density from x towards the light,  so that light reaches x times exp(-extinction
-/// c(x)). It is smooth where the light is not: interpolated linearly it errs by O(h^2) however opaque a voxel
-/// is. Known wherever the volume holds density, and not outside. Nodes are as far apart as the density's
-/// voxels.
+/// c(x)). It is smooth where the light is not, and what is interpolated is nearly straight where density
+/// begins, see detail::bentColumn, so that the light is right however opaque a voxel is. Known wherever the
+/// volume holds density, and not outside. Nodes are as far apart as the density's voxels.
 class LightVolume {
  public:
   static constexpr int kBrick = 8;
@@ -38,6 +45,8 @@ class LightVolume {
     /// Columns beyond this need not be told apart: no light is left there. Bricks that lie wholly beyond it
     /// hold this everywhere, and most are not worked out.
     float dark = std::numeric_limits<float>::infinity();
+    /// Density above this counts as this: columns of a thinned volume, see ScatteredLight.
+    float most = std::numeric_limits<float>::infinity();
     /// Codes bricks as they are worked out, in half the memory. Neither `replace` nor `addShade` may follow.
     bool coded = false;
   };
@@ -61,8 +70,10 @@ class LightVolume {
   /// Pool brick of every brick of the lattice, first axis fastest; 0 is a brick of zeros, and 1, where
   /// Options::dark is finite, a dark one.
   const std::vector<std::int32_t>& table() const { return table_; }
-  /// kVolume values per pool brick, first axis fastest: the nodes 0 to 8 of its cells. Empty once coded.
+  /// kVolume values per pool brick, first axis fastest: bentColumn(c, bend()) at the nodes 0 to 8 of its
+  /// cells. Empty once coded.
   const detail::UnsetVector<float>& values() const { return values_; }
+  float bend() const { return bend_; }
 
   /// Codes the values for the march, if they are not: the last thing to do, since neither `replace` nor
   /// `addShade` may follow. Uses all cores.
@@ -105,7 +116,7 @@ class LightVolume {
   Vec3i firstBrick_, brickCount_;
   std::vector<std::int32_t> table_;
   detail::UnsetVector<float> values_;
-  float dark_ = INFINITY;
+  float dark_ = INFINITY, bend_ = 0;
   CodedBricks coded_;
 };
 

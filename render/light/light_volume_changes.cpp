@@ -58,8 +58,17 @@ void LightVolume::addShade(const std::function<double(const Ray&)>& distanceToSh
           shade.begins[m][p] = sign * start + float(distance / perSlice);
         }
       for (std::size_t n = 0; n != std::size_t(brickCount_.z); ++n)
-        if (const std::int32_t pool = table_[n * across + column]; isStored(pool))
-          shade.addTo(values_.data() + std::size_t(pool) * kVolume, node.z + int(n) * kBrick, perDepth);
+        if (const std::int32_t pool = table_[n * across + column]; isStored(pool)) {
+          const std::span nodes(values_.data() + std::size_t(pool) * kVolume, kVolume);
+          std::array<float, kVolume> columns;
+          std::transform(nodes.begin(), nodes.end(), columns.begin(),
+                         [&](float bent) { return detail::unbentColumn(bent, bend_); });
+          const std::array<float, kVolume> before = columns;
+          shade.addTo(columns.data(), node.z + int(n) * kBrick, perDepth);
+          // What is not shaded keeps its bits.
+          for (std::size_t i = 0; i != columns.size(); ++i)
+            if (columns[i] != before[i]) nodes[i] = detail::bentColumn(columns[i], bend_);
+        }
     }
   });
 }
@@ -89,8 +98,10 @@ void LightVolume::replace(const std::function<float(const Vec3f&)>& column) {
       const auto nx = std::size_t(brickCount_.x), ny = std::size_t(brickCount_.y);
       const Vec3i node =
           (firstBrick_ + Vec3i{int(entry % nx), int(entry / nx % ny), int(entry / (nx * ny))}) * kBrick;
+      const std::span nodes(values_.data() + std::size_t(table_[entry]) * kVolume, kVolume);
       detail::replaceBrick([&](const Vec3i& at) { return column(latticeToWorld(Vec3f(node + at))); },
-                           values_.data() + std::size_t(table_[entry]) * kVolume);
+                           nodes.data());
+      for (float& value : nodes) value = detail::bentColumn(std::max(value, 0.0f), bend_);
     }
   });
 }

@@ -14,16 +14,18 @@
 // Source: discrete ordinates and short characteristics are textbook transport (Lewis and Miller,
 // "Computational Methods of Neutron Transport", 1984).
 //
-// Limits: light spreads by half a cell per slice, and though half of that is taken back by what two lattices
-// differ by, a little too much reaches the dark side of a core that is lit from one side only. Details
-// smaller than a cell are lit as the cell is; what is thin even among thinned cells gives back less than it
-// takes.
+// Limits: where light ends within a cell, as at the rim of a cloud, some of it spreads into the air beside
+// it; what two lattices differ by tells how much, and half of that is taken back. Details smaller than a cell
+// are lit as the cell is. Thinned cells let out more light that was scattered once than the real ones do,
+// which the marcher adds: in wisps that are thinned deeply it lacks in what was scattered more often.
 #include "nephele/render/light/scattered_light.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
@@ -70,23 +72,6 @@ void check(const Scattering& scattering, const ScatteredLight::Options& options)
 
 }  // namespace
 
-ScatteredSource ScatteredSource::of(const LightVolume& sun, const Vec3f& towards) {
-  ScatteredSource source;
-  source.irradiance = [](const Vec3f&) { return 1.0f; };
-  source.columns = [&sun](std::span<const Vec3f> world, std::span<float> found) {
-    sun.columnDensities(world, found);
-  };
-  source.leastColumn = [&sun](std::span<const Vec3f> world) { return sun.leastColumnDensity(world); };
-  source.towards = towards;
-  return source;
-}
-
-ScatteredSource ScatteredSource::evenSky() {
-  ScatteredSource source;
-  source.sky = [](const std::vector<Vec3f>& ways) { return std::vector<float>(ways.size(), 1.0f); };
-  return source;
-}
-
 int ScatteredLight::Options::degree(const std::vector<float>& phase) const {
   const int most = mostDegree(order);
   int degree = 0;
@@ -124,6 +109,8 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   rows_ = std::make_shared<const detail::CellRows>(size_, std::vector<std::uint8_t>(std::size_t(size_.x), 1));
   for (const float moment : sky_) moments_.insert(moments_.end(), std::size_t(size_.x), moment);
   beam_ = density_ = std::vector<float>(std::size_t(size_.x));
+  centre_.resize(beam_.size());
+  share_.assign(std::size_t(size_.x), 1.0f);
   if (volume.isEmpty()) return;
 
   const SmoothScattering smooth(scattering.phase, scattering.albedo, degree);
@@ -131,23 +118,48 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   phase_ = smooth.moments;
   const detail::LatticePlacement place(volume, options.longestSide);
   detail::ScatteringLattice lattice = place.lattice();
-  detail::sampleDensity(volume, place, lattice);
+  detail::sampleDensity(volume, place, INFINITY, lattice);
   const float perDensity = scattering.extinction * smooth.share * grid.voxelSize() * place.voxelsPerCell(),
               deepest = perDensity * detail::typicalDensity(lattice);
   smoothShare_ = smooth.share;
-  share_ = smooth.share * (deepest > kDeepestCell ? kDeepestCell / deepest : 1.0f);
-  detail::sampleBeam(volume, place, source, scattering.extinction * share_, lattice);
+  // Of cells of the thinned density, and what is too dense of the volume's own.
+  float share = smooth.share, most = INFINITY;
+  std::optional<detail::ScatteringLattice> whole;
+  ScatteredSource beam = source;
+  std::shared_ptr<const LightVolume> thinned;
+  if (deepest > kDeepestCell && source.columns && !source.thinned) {
+    share *= kDeepestCell / deepest;
+  } else if (deepest > kDeepestCell) {
+    most = kDeepestCell / perDensity;
+    whole = lattice;
+    detail::sampleDensity(volume, place, most, lattice);
+    if (source.thinned) {
+      thinned = source.thinned(most, detail::kDarkDepth / (scattering.extinction * share * source.shadow));
+      beam.setColumns(*thinned);
+    }
+  }
+  detail::sampleBeam(volume, place, beam, scattering.extinction * share, most, lattice);
+  thinned.reset();
   if (source.glow)
-    for (float& value : lattice.beam) value /= share_ * std::max(albedo_, 1e-6f);
-  for (int i = 0; i != place.halvings; ++i) lattice = detail::halved(lattice);
-
+    for (float& value : lattice.beam) value /= share * std::max(albedo_, 1e-6f);
+  for (int i = 0; i != place.halvings; ++i) {
+    lattice = detail::halved(lattice);
+    if (whole) whole = detail::halved(*whole);
+  }
   size_ = lattice.size;
+  share_.assign(lattice.density.size(), share);
+  if (whole) {
+    for (std::size_t i = 0; i != share_.size(); ++i)
+      if (whole->density[i] > 0) share_[i] *= std::min(lattice.density[i] / whole->density[i], 1.0f);
+    growShares(whole->density);
+    whole.reset();
+  }
   const float scale = 1 / lattice.voxels;
   const Vec3f middle =
       Vec3f(place.firstBrick * BrickGrid::kBrick) + Vec3f{1, 1, 1} * (0.5f * (lattice.voxels - 1));
   worldToLattice_ = {Mat3f::scaling(scale) * grid.worldToIndex().linear,
                      (grid.worldToIndex().translation - middle) * scale};
-  depthPerDensity_ = scattering.extinction * share_ * grid.voxelSize() * lattice.voxels;
+  depthPerDensity_ = scattering.extinction * share * grid.voxelSize() * lattice.voxels;
   if (source.towards) towards_ = normalize(worldToLattice_.linear * *source.towards);
   if (source.place) place_ = worldToLattice_(*source.place);
 
@@ -167,6 +179,27 @@ ScatteredLight::ScatteredLight(const RenderVolume& volume, const Scattering& sca
   rows_ = std::make_shared<const detail::CellRows>(std::move(solver.finestRows()));
   beam_ = std::move(solver.finest().beam);
   density_ = std::move(solver.finest().density);
+  centre_ = std::move(solver.finest().centre);
+}
+
+// Light is read between cells, so those that hold nothing have the share of those that do around them.
+void ScatteredLight::growShares(const std::vector<float>& density) {
+  const std::size_t row = std::size_t(size_.x), slice = row * std::size_t(size_.y);
+  const std::vector<float> shares = share_;
+  parallelFor(std::size_t(std::max(size_.z - 2, 0)), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t z = begin + 1; z != end + 1; ++z)
+      for (std::size_t y = 1; y + 1 < std::size_t(size_.y); ++y)
+        for (std::size_t x = 1; x + 1 < row; ++x) {
+          const std::size_t i = z * slice + y * row + x;
+          if (density[i] > 0) continue;
+          float sum = 0, weights = 0;
+          for (std::size_t k = i - slice; k <= i + slice; k += slice)
+            for (std::size_t j = k - row; j <= k + row; j += row)
+              for (std::size_t n = j - 1; n != j + 2; ++n)
+                sum += density[n] * shares[n], weights += density[n];
+          if (weights > 0) share_[i] = sum / weights;
+        }
+  });
 }
 
 Vec3f ScatteredLight::wayOfBeam(const Vec3f& node) const {
@@ -242,8 +275,8 @@ ScatteredLight::Bytes ScatteredLight::estimateBytes(const RenderVolume& volume, 
                near = kept * place.sampledCellsNear(volume, detail::TransportSolver::kReach);
   // Moments: the light, swept and turned, what is added up there, and the acceleration's, on all lattices;
   // beside them what the sweeps know of every cell.
-  return {(7 * moments + 14) * sizeof(float) * near + 3 * sizeof(float) * sampled,
-          moments * sizeof(float) * near + 3 * sizeof(float) * nodes};
+  return {(7 * moments + 14) * sizeof(float) * near + 12 * sizeof(float) * sampled,
+          moments * sizeof(float) * near + 6 * sizeof(float) * nodes};
 }
 
 }  // namespace nephele

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -8,8 +7,8 @@
 
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/progress.h"
-#include "nephele/render/light/light_volume.h"
 #include "nephele/render/light/phase_expansion.h"
+#include "nephele/render/light/scattered_source.h"
 #include "nephele/render/light/viewpoint.h"
 #include "nephele/render/volume/render_volume.h"
 
@@ -28,34 +27,11 @@ struct Scattering {
   std::vector<float> phase{1.0f};
 };
 
-/// Where light comes from: a beam through the volume, the sky around it, or what glows in it.
-struct ScatteredSource {
-  /// Irradiance of the beam at a world-space point without the volume.
-  std::function<float(const Vec3f&)> irradiance;
-  /// The density on the beam's way to points, see LightVolume::columnDensities.
-  std::function<void(std::span<const Vec3f> world, std::span<float> columns)> columns;
-  /// A lower bound of it between points, see LightVolume::leastColumnDensity; 0 where there is none.
-  std::function<float(std::span<const Vec3f> world)> leastColumn;
-  /// Multiplies the extinction on that way.
-  float shadow = 1.0f;
-  /// Where the beam comes from: a direction towards it, or a place.
-  std::optional<Vec3f> towards, place;
-  /// Radiance of the sky in each of some unit directions, which stand for about equal shares of the sphere.
-  std::function<std::vector<float>(const std::vector<Vec3f>&)> sky;
-  /// Radiance per optical depth of what glows at a point; then there is no beam.
-  std::function<float(const Vec3f&)> glow;
-
-  /// A light of irradiance 1 everywhere, whose column densities are `sun`.
-  static ScatteredSource of(const LightVolume& sun, const Vec3f& towards);
-  /// A sky of radiance 1.
-  static ScatteredSource evenSky();
-};
-
 /// Light in a volume by discrete ordinates, as moments over all directions, on a coarse lattice.
 ///
 /// The transport equation is solved in a medium without forward peak (SmoothScattering), whose cells are
-/// thinned where they are nearly opaque: what is thinned away counts as light that goes on as before, for the
-/// beam and for what becomes of it alike, so that no light is lost.
+/// thinned where they would be nearly opaque, by a density that no voxel exceeds: what is thinned away counts
+/// as light that goes on as before, for the beam and for what becomes of it alike, so that no light is lost.
 class ScatteredLight {
  public:
   struct Options {
@@ -67,7 +43,7 @@ class ScatteredLight {
     /// Sweeps over the finest lattice, at most; they end where one changes less of all light than
     /// `tolerance`, and leaves about as much to change.
     int sweeps = 16;
-    float tolerance = 5e-3f;
+    float tolerance = 2e-3f;
 
     /// The degree for a phase function with these moments: where those above it are below 0.1, at most that
     /// of the directions.
@@ -127,12 +103,14 @@ class ScatteredLight {
   Vec3f wayOfBeam(const Vec3f& node) const;
   bool hasWay() const { return towards_ || place_; }
   void sharpen(std::vector<float>& values) const;
+  void growShares(const std::vector<float>& density);
 
   Affine worldToLattice_;
   Vec3i size_{1, 1, 1};
-  // The solver's extinction over the medium's, and what it was before cells were thinned; its albedo, the
-  // optical depth of a cell of density 1, and the moments of its phase function.
-  float share_ = 1, smoothShare_ = 1, albedo_ = 1, depthPerDensity_ = 0;
+  // The solver's extinction over the medium's, of all nodes, and what it was before cells were thinned; its
+  // albedo, the optical depth of a cell of density 1, and the moments of its phase function.
+  std::vector<float> share_;
+  float smoothShare_ = 1, albedo_ = 1, depthPerDensity_ = 0;
   std::vector<float> phase_{1.0f};
   // As in ScatteredSource, in the lattice.
   std::optional<Vec3f> towards_, place_;
@@ -141,8 +119,9 @@ class ScatteredLight {
   // Nodes near density, and the moments of the light at each of them, beam and all.
   std::shared_ptr<const detail::CellRows> rows_;
   detail::UnsetVector<float> moments_;
-  // The beam alone and the density, at all nodes.
+  // The beam alone and the thinned density, at all nodes, and its centre, see ScatteringLattice.
   std::vector<float> beam_, density_;
+  std::vector<Vec3f> centre_;
   int sweeps_ = 0;
   float residual_ = 0;
 };

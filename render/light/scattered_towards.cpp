@@ -82,14 +82,17 @@ void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights,
   std::vector<detail::Met> met(cells);
   std::vector<std::vector<float>> own;
   for (std::size_t k = 0; k != lights.size(); ++k)
-    own.push_back(Sender{*lights[k]}.sources(viewpoint.place ? eye : forward, viewpoint.place.has_value(),
-                                             [&](std::size_t i, float all) {
-                                               met[i].values[0] = any.density_[i];
-                                               met[i].values[1 + k] = all;
-                                             }));
+    own.push_back(Sender{*lights[k]}.sources(
+        viewpoint.place ? eye : forward, viewpoint.place.has_value(),
+        [&](std::size_t i, float itsOwn, float ofBeam) {
+          met[i].values[0] = any.density_[i];
+          const float goesOn = 1 - any.share_[i];
+          met[i].values[1 + k] = itsOwn + (goesOn > 0 ? (1 - any.smoothShare_) / goesOn * ofBeam : 0.0f);
+        }));
   for (std::vector<float>* values : sent) values->resize(cells);
+  const float leastShare = *std::ranges::min_element(any.share_);
   const detail::SightLattice lattice{any.size_, met.data(), any.depthPerDensity_,
-                                     std::min(kCutoff / std::max(1 - any.share_, kCutoff), kLargestCutoff)};
+                                     std::min(kCutoff / std::max(1 - leastShare, kCutoff), kLargestCutoff)};
   any.rows_->forEachRow([&](int y, int z, const detail::CellRows::Row& row) {
     detail::LinesOfSight lines;
     for (int x0 = row.begin; x0 < row.end; x0 += detail::LinesOfSight::kCount) {
@@ -111,12 +114,11 @@ void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights,
         }
     }
   });
-  const float share = any.share_;
   for (std::size_t k = 0; k != lights.size(); ++k) {
     any.sharpen(own[k]);
     parallelFor(cells, 1 << 16, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i)
-        (*sent[k])[i] = share * own[k][i] + (1 - share) * (*sent[k])[i];
+        (*sent[k])[i] = any.share_[i] * own[k][i] + (1 - any.share_[i]) * (*sent[k])[i];
     });
   }
 }
@@ -147,7 +149,6 @@ std::vector<float> ScatteredLight::Sender::sources(const Vec3f& eye, bool isPlac
     cells.weights = weights;
     cells.beamWay = beamWay;
     cells.beamPlace = light.place_ ? &*light.place_ : nullptr;
-    if (light.share_ < 1) cells.ofBeam = (1 - light.smoothShare_) / (1 - light.share_);
     const std::size_t first =
         (std::size_t(z) * std::size_t(light.size_.y) + std::size_t(y)) * std::size_t(light.size_.x);
     for (int x = row.begin; x != row.end; x += detail::CellRows::kVector) {
@@ -159,26 +160,33 @@ std::vector<float> ScatteredLight::Sender::sources(const Vec3f& eye, bool isPlac
       detail::send(cells);
       for (std::size_t n = 0; n != detail::CellRows::kVector; ++n) {
         own[from + n] = cells.own[n];
-        tell(from + n, cells.all[n]);
+        tell(from + n, cells.own[n], cells.ofBeam[n]);
       }
     }
   });
   return own;
 }
 
-// Values are means over cells. Interpolated between nodes they would have the mean (v_before + 6 v +
-// v_behind) / 8 along every axis: what that lacks is added.
+// Values are means over the density in cells. What is interpolated between nodes has other means: at a
+// distance x behind a node, in cells, of -1/2 to 1/2, it is v + x (behind - v) or v - x (before - v), so that
+// the mean along an axis is v + (m + c) / 2 (behind - v) + (m - c) / 2 (before - v), where c is the mean of
+// x, the centre of the density, and m that of |x|: 1/4, or more where all of it is farther out. What values
+// have more than these means is added.
 void ScatteredLight::sharpen(std::vector<float>& values) const {
   const std::size_t strides[3] = {1, std::size_t(size_.x), std::size_t(size_.x) * std::size_t(size_.y)};
-  std::vector<float> sharp(values.size());
+  std::vector<float> sharp(values);
   rows_->forEachCell([&](std::size_t i, std::size_t, const Vec3f& node) {
+    if (!(density_[i] > 0)) return;
     float lacks = 0;
-    for (int axis = 0; axis != 3; ++axis)
-      if (node[axis] >= 1 && node[axis] <= float(size_[axis] - 2))
-        lacks += 2 * values[i] - values[i - strides[axis]] - values[i + strides[axis]];
+    for (int axis = 0; axis != 3; ++axis) {
+      if (node[axis] < 1 || node[axis] > float(size_[axis] - 2)) continue;
+      const float centre = centre_[i][axis], away = std::max(0.25f, std::abs(centre));
+      lacks += 0.5f * ((away + centre) * (values[i] - values[i + strides[axis]]) +
+                       (away - centre) * (values[i] - values[i - strides[axis]]));
+    }
     const float least = std::min(0.5f * values[i], 2 * values[i]),
                 most = std::max(0.5f * values[i], 2 * values[i]);
-    sharp[i] = std::clamp(values[i] + 0.125f * lacks, least, most);
+    sharp[i] = std::clamp(values[i] + lacks, least, most);
   });
   values = std::move(sharp);
 }

@@ -72,9 +72,10 @@ struct MarchScene {
   }
   bool glows() const { return emission.table || hasStepGlow; }
 
-  /// `shadow` multiplies the extinction between light and sample, per colour.
+  /// `shadow` multiplies the extinction between light and sample, per colour; for `bend` see LightVolume.
   struct Sun : Bricks {
     float shadow[3] = {1.0f, 1.0f, 1.0f};
+    float bend = 0.0f;
   };
   std::vector<Sun> suns;
 

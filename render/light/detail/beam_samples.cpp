@@ -1,7 +1,7 @@
 // Samples of the density and of a beam, averaged over the cells of a lattice.
 //
-// A beam is not sampled at points but averaged along the line of each sample: in the first voxel of a dense
-// cloud a point would be nearly in the light or nearly in the dark.
+// A beam is sampled at points: averaged along the line of a sample, as if the density were the same there, it
+// would be by some per cent too bright where density begins.
 #include "nephele/render/light/detail/beam_samples.h"
 
 #include <algorithm>
@@ -17,9 +17,6 @@ namespace nephele::detail {
 
 namespace {
 
-// Behind so much nothing is left of a beam.
-constexpr float kDarkDepth = 12;
-
 // Samples along a cell, none of them at a voxel, where they would see none of what is between. Where cells
 // are wide a sample between eight voxels stands for these.
 int samplesAlong(const LatticePlacement& place) {
@@ -29,14 +26,6 @@ int samplesAlong(const LatticePlacement& place) {
 // Voxels from one sample to the next.
 float spacingOf(const LatticePlacement& place) {
   return place.voxelsPerSampledCell() / float(samplesAlong(place));
-}
-
-// Mean of what is left of a beam along a sample of optical depth `depth`, whose middle it sees through
-// `before`.
-float meanTransmittance(float before, float depth) {
-  if (depth < 0.01f) return expOfMinus(before);
-  const float up = std::min(0.5f * depth, before), down = 0.5f * depth;
-  return (expOfMinus(before - up) - expOfMinus(std::min(before + down, 80.0f))) / (up + down);
 }
 
 // Samples of a brick: of its node 0, and how many there are in a row.
@@ -72,37 +61,44 @@ DecodedBrick decoded(const RenderVolume& volume, const Vec3i& brick, bool needsB
 struct SampleRow {
   static constexpr int kMost = 2 * BrickGrid::kBrick;
 
-  // Sums of the cells along it, of which each has so many samples. In double, so that they do not depend on
-  // the order: mirrored light has the same bits.
+  // Sums of the cells along it, `kinds` for each, which has so many samples. In double, so that they do not
+  // depend on the order: mirrored light has the same bits.
   double* sums;
-  int perCell;
+  int kinds, perCell;
   // The first sample in voxels; the others follow at the samples' spacing.
   Vec3f voxel;
+  // From the middle of their cell, in cells: all along x, and the row.
+  const float* inCell;
+  float y, z;
   std::span<const float> density;
 
-  double& sumOf(std::size_t sample) const { return sums[sample / std::size_t(perCell)]; }
+  double* sumsOf(std::size_t sample) const {
+    return sums + sample / std::size_t(perCell) * std::size_t(kinds);
+  }
 };
 
-// Means over the samples between the voxels of every cell, as many in each, of what add(row) adds where any
-// is above 0: of bricks that wants(brick).
-template <class Wants, class Add>
-void setMeans(const RenderVolume& volume, const LatticePlacement& place, const ScatteringLattice& lattice,
-              std::vector<float>& means, Wants&& wants, Add&& add) {
+// Calls set(cell, means) with means over the samples between the voxels of every cell, as many in each, of
+// what add(row) adds of so many kinds where any is above 0: of bricks that wants(brick). Voxels above `most`
+// count as that.
+template <int kKinds, class Wants, class Add, class Set>
+void forMeans(const RenderVolume& volume, const LatticePlacement& place, float most,
+              const ScatteringLattice& lattice, Wants&& wants, Add&& add, Set&& set) {
   const BrickGrid& grid = volume.density();
   const std::vector<Vec3i>& occupied = volume.occupiedBricks();
   const float spacing = spacingOf(place);
   const int perBrick = place.cellsPerBrick, perCell = samplesAlong(place), across = perBrick * perCell;
   int low[SampleRow::kMost];
-  float at[SampleRow::kMost], share[SampleRow::kMost];
+  float at[SampleRow::kMost], share[SampleRow::kMost], inCell[SampleRow::kMost];
   for (int n = 0; n != across; ++n) {
     at[n] = (float(n) + 0.5f) * spacing - 0.5f;
     low[n] = int(std::floor(at[n]));
     share[n] = at[n] - float(low[n]);
+    inCell[n] = (float(n % perCell) + 0.5f) / float(perCell) - 0.5f;
   }
   const double each = 1 / std::pow(double(perCell), 3);
   parallelFor(occupied.size(), 32, [&](std::size_t begin, std::size_t end) {
     float density[SampleRow::kMost], nodes[DecodedBrick::kMost];
-    double sums[BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick];
+    double sums[kKinds * BrickGrid::kBrick * BrickGrid::kBrick * BrickGrid::kBrick];
     for (std::size_t i = begin; i != end; ++i) {
       if (!wants(occupied[i])) continue;
       const Vec3i origin = (occupied[i] - place.firstBrick) * perBrick;
@@ -110,37 +106,39 @@ void setMeans(const RenderVolume& volume, const LatticePlacement& place, const S
       const Interval& range = grid.ranges()[std::size_t(pool)];
       DecodedBrick brick{grid.brick(pool) + sampleOffset(0, 0, 0), BrickGrid::kWidth};
       if (!volume.hasSamples() && !range.isPoint()) brick = decoded(volume, occupied[i], low[0] < 0, nodes);
-      std::fill_n(density, across, range.max);
-      std::fill_n(sums, perBrick * perBrick * perBrick, 0.0);
+      std::fill_n(density, across, std::min(range.max, most));
+      std::fill_n(sums, kKinds * perBrick * perBrick * perBrick, 0.0);
       for (int z = 0; z != across; ++z)
         for (int y = 0; y != across; ++y) {
-          float most = range.max;
+          float densest = range.max;
           if (!range.isPoint()) {
             const float* rows[4];
             for (int n = 0; n != 4; ++n)
               rows[n] = brick.first + ((low[z] + n / 2) * brick.width + low[y] + n % 2) * brick.width;
-            most = 0;
+            densest = 0;
             const auto mix = [](float a, float b, float ofB) { return (1 - ofB) * a + ofB * b; };
             for (int x = 0; x != across; ++x) {
               const auto along = [&](const float* row) {
-                return mix(std::max(row[low[x]], 0.0f), std::max(row[low[x] + 1], 0.0f), share[x]);
+                return mix(std::clamp(row[low[x]], 0.0f, most), std::clamp(row[low[x] + 1], 0.0f, most),
+                           share[x]);
               };
               density[x] = mix(mix(along(rows[0]), along(rows[1]), share[y]),
                                mix(along(rows[2]), along(rows[3]), share[y]), share[z]);
-              most = std::max(most, density[x]);
+              densest = std::max(densest, density[x]);
             }
           }
-          if (!(most > 0)) continue;
-          add(SampleRow{sums + ((z / perCell) * perBrick + y / perCell) * perBrick, perCell,
-                        Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]},
-                        std::span<const float>(density, std::size_t(across))});
+          if (!(densest > 0)) continue;
+          add(SampleRow{sums + kKinds * ((z / perCell) * perBrick + y / perCell) * perBrick, kKinds, perCell,
+                        Vec3f(occupied[i] * BrickGrid::kBrick) + Vec3f{at[0], at[y], at[z]}, inCell,
+                        inCell[y], inCell[z], std::span<const float>(density, std::size_t(across))});
         }
-      const double* sum = sums;
+      double* sum = sums;
       for (int z = 0; z != perBrick; ++z)
-        for (int y = 0; y != perBrick; ++y) {
-          float* row = means.data() + lattice.index(origin.x, origin.y + y, origin.z + z);
-          for (int x = 0; x != perBrick; ++x) row[x] = float(each * *sum++);
-        }
+        for (int y = 0; y != perBrick; ++y)
+          for (int x = 0; x != perBrick; ++x, sum += kKinds) {
+            for (int kind = 0; kind != kKinds; ++kind) sum[kind] *= each;
+            set(lattice.index(origin.x + x, origin.y + y, origin.z + z), sum);
+          }
     }
   });
 }
@@ -182,19 +180,33 @@ double LatticePlacement::sampledCellsNear(const RenderVolume& volume, int reach)
   return sum * cellsPerBrick * cellsPerBrick;
 }
 
-void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice) {
-  const auto all = [](const Vec3i&) { return true; };
-  setMeans(volume, place, lattice, lattice.density, all, [](const SampleRow& row) {
-    for (std::size_t n = 0; n != row.density.size(); ++n) row.sumOf(n) += double(row.density[n]);
-  });
+void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, float most,
+                   ScatteringLattice& lattice) {
+  forMeans<4>(
+      volume, place, most, lattice, [](const Vec3i&) { return true; },
+      [](const SampleRow& row) {
+        for (std::size_t n = 0; n != row.density.size(); ++n) {
+          double* sums = row.sumsOf(n);
+          const double density = double(row.density[n]);
+          sums[0] += density;
+          sums[1] += density * double(row.inCell[n]);
+          sums[2] += density * double(row.y);
+          sums[3] += density * double(row.z);
+        }
+      },
+      [&](std::size_t cell, const double* means) {
+        lattice.density[cell] = float(means[0]);
+        const double per = means[0] > 0 ? 1 / means[0] : 0;
+        lattice.centre[cell] = {float(per * means[1]), float(per * means[2]), float(per * means[3])};
+      });
 }
 
 void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const ScatteredSource& source,
-                float extinction, ScatteringLattice& lattice) {
+                float extinction, float most, ScatteringLattice& lattice) {
   if (!source.columns && !source.glow) return;
   const BrickGrid& grid = volume.density();
-  const float spacing = spacingOf(place), behind = extinction * source.shadow,
-              perDensity = behind * grid.voxelSize() * spacing;
+  const float spacing = spacingOf(place), behind = extinction * source.shadow;
+  if (source.glow) most = INFINITY;
   const auto isLit = [&](const Vec3i& brick) {
     if (!source.leastColumn) return true;
     std::array<Vec3f, 8> corners;
@@ -205,30 +217,26 @@ void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const
           Vec3f{0.5f, 0.5f, 0.5f});
     return behind * source.leastColumn(corners) < kDarkDepth;
   };
-  setMeans(volume, place, lattice, lattice.beam, isLit, [&](const SampleRow& row) {
+  const auto add = [&](const SampleRow& row) {
     const std::size_t count = row.density.size();
     Vec3f world[SampleRow::kMost];
     for (std::size_t n = 0; n != count; ++n)
       world[n] = grid.indexToWorld()(row.voxel + Vec3f{float(n) * spacing, 0, 0});
     float columns[SampleRow::kMost];
     if (source.columns) source.columns({world, count}, {columns, count});
-    // Inside a thick cloud the next sample is often like the last.
-    float before = -1, rho = -1, left = 0;
     for (std::size_t n = 0; n != count; ++n) {
       if (!(row.density[n] > 0)) continue;
-      double& beam = row.sumOf(n);
+      double& beam = *row.sumsOf(n);
       if (source.glow) {
         beam += double(row.density[n] * source.glow(world[n]));
         continue;
       }
-      if (columns[n] != before || row.density[n] != rho) {
-        before = columns[n];
-        rho = row.density[n];
-        left = meanTransmittance(std::clamp(behind * before, 0.0f, 80.0f), std::min(perDensity * rho, 80.0f));
-      }
-      beam += double(rho * source.irradiance(world[n]) / (4 * kPi) * left);
+      const float left = expOfMinus(std::clamp(behind * columns[n], 0.0f, 80.0f));
+      beam += double(row.density[n] * source.irradiance(world[n]) / (4 * kPi) * left);
     }
-  });
+  };
+  forMeans<1>(volume, place, most, lattice, isLit, add,
+              [&](std::size_t cell, const double* means) { lattice.beam[cell] = float(*means); });
   for (std::size_t i = 0; i != lattice.beam.size(); ++i)
     if (lattice.density[i] > 0) lattice.beam[i] /= lattice.density[i];
 }

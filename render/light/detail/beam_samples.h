@@ -25,12 +25,17 @@ struct LatticePlacement {
   double sampledCellsNear(const RenderVolume& volume, int reach) const;
 };
 
-/// Sets the lattice's densities: means of what the march reads between the voxels.
-void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, ScatteringLattice& lattice);
+/// Behind so much nothing is left of a beam.
+inline constexpr float kDarkDepth = 12;
+
+/// Sets the lattice's densities: means of what the march reads between the voxels, of which those above
+/// `most` count as that.
+void sampleDensity(const RenderVolume& volume, const LatticePlacement& place, float most,
+                   ScatteringLattice& lattice);
 
 /// Sets the beam: irradiance over 4 pi where the density is, and what is left of it behind `extinction`; or
-/// what glows, per density.
+/// what glows, per density of the lattice. Densities above `most` count as that, but for what glows.
 void sampleBeam(const RenderVolume& volume, const LatticePlacement& place, const ScatteredSource& source,
-                float extinction, ScatteringLattice& lattice);
+                float extinction, float most, ScatteringLattice& lattice);
 
 }  // namespace nephele::detail

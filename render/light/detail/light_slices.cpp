@@ -28,13 +28,13 @@ HWY_INLINE SliceFloats mixOfFour(const float* HWY_RESTRICT at, int apart,
   return hn::Add(hn::Add(term(0), term(1)), hn::Add(term(2), term(3)));
 }
 
-void mixSliceOf(const float* HWY_RESTRICT samples, const detail::SliceWeights& weights,
+void mixSliceOf(const float* HWY_RESTRICT samples, const detail::SliceWeights& weights, float most,
                 float* HWY_RESTRICT out) {
   using namespace detail;
   const SliceLanes d;
   alignas(64) float dense[(kSliceNodes + 4) * kSliceRow], rows[(kSliceNodes + 3) * kSliceRow];
   for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)
-    hn::Store(hn::Max(hn::LoadU(d, samples + i), hn::Zero(d)), d, dense + i);
+    hn::Store(hn::Min(hn::Max(hn::LoadU(d, samples + i), hn::Zero(d)), hn::Set(d, most)), d, dense + i);
   // Only lanes that do not matter look behind the last row.
   std::fill_n(dense + (kSliceNodes + 3) * kSliceRow, kSliceRow, 0.0f);
   for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)
@@ -59,21 +59,13 @@ void addSliceOf(const float* HWY_RESTRICT after, float* HWY_RESTRICT sum) {
     hn::Store(hn::Add(hn::Load(d, sum + i), hn::Load(d, after + i)), d, sum + i);
 }
 
-void storeSliceOf(const float* HWY_RESTRICT sum, const detail::Slices& at, float share,
-                  float* HWY_RESTRICT out) {
+void storeSliceOf(const float* HWY_RESTRICT sum, float bend, float* HWY_RESTRICT out) {
   using namespace detail;
   const SliceLanes d;
   alignas(64) float nodes[kSliceArea];
-  const SliceFloats zero = hn::Zero(d), least = hn::Set(d, 1e-30f);
   for (int i = 0; i != kSliceArea; i += kSliceLanes) {
-    const SliceFloats before = hn::Max(hn::Load(d, at.before->data() + i), zero),
-                      after = hn::Max(hn::Load(d, at.after->data() + i), zero);
-    const SliceFloats density = hn::Load(d, at.density->data() + i);
-    const SliceFloats grown = hn::Mul(before, hn::Sub(density, hn::Load(d, at.previous->data() + i))),
-                      grows = hn::Mul(after, hn::Sub(hn::Load(d, at.next->data() + i), density));
-    const SliceFloats growth = hn::Mul(hn::Set(d, share), hn::Add(grown, grows));
-    hn::Store(hn::Sub(hn::Load(d, sum + i), hn::Div(growth, hn::Max(hn::Add(before, after), least))), d,
-              nodes + i);
+    const SliceFloats column = hn::Max(hn::Load(d, sum + i), hn::Zero(d));
+    hn::Store(hn::Sqrt(hn::Mul(column, hn::Add(column, hn::Set(d, 2 * bend)))), d, nodes + i);
   }
   for (int j = 0; j != kSliceNodes; ++j)
     std::copy_n(nodes + j * kSliceRow, kSliceNodes, out + j * kSliceNodes);
@@ -91,8 +83,8 @@ HWY_EXPORT(addSlicesOf);
 HWY_EXPORT(addSliceOf);
 HWY_EXPORT(storeSliceOf);
 
-void detail::mixSlice(const float* samples, const SliceWeights& weights, SliceNodes& out) {
-  HWY_DYNAMIC_DISPATCH(mixSliceOf)(samples, weights, out.data());
+void detail::mixSlice(const float* samples, const SliceWeights& weights, float most, SliceNodes& out) {
+  HWY_DYNAMIC_DISPATCH(mixSliceOf)(samples, weights, most, out.data());
 }
 
 void detail::addSlices(float end, const SliceNodes& a, const SliceNodes& b, float middle, const SliceNodes& c,
@@ -104,8 +96,8 @@ void detail::addSlice(const SliceNodes& after, SliceNodes& sum) {
   HWY_DYNAMIC_DISPATCH(addSliceOf)(after.data(), sum.data());
 }
 
-void detail::storeSlice(const SliceNodes& sum, const Slices& at, float share, float* out) {
-  HWY_DYNAMIC_DISPATCH(storeSliceOf)(sum.data(), at, share, out);
+void detail::storeSlice(const SliceNodes& sum, float bend, float* out) {
+  HWY_DYNAMIC_DISPATCH(storeSliceOf)(sum.data(), bend, out);
 }
 
 }  // namespace nephele

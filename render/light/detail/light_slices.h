@@ -15,8 +15,8 @@ struct SliceWeights {
 };
 
 /// Mixes 12 x 12 samples, `kSliceRow` apart from row to row, into the nodes of a slice; samples below 0
-/// count as 0.
-void mixSlice(const float* samples, const SliceWeights& weights, SliceNodes& out);
+/// count as 0, and those above `most` as that.
+void mixSlice(const float* samples, const SliceWeights& weights, float most, SliceNodes& out);
 
 /// out = end (a + b) + middle (c + d): Simpson's rule with its middle in two halves.
 void addSlices(float end, const SliceNodes& a, const SliceNodes& b, float middle, const SliceNodes& c,
@@ -25,14 +25,8 @@ void addSlices(float end, const SliceNodes& a, const SliceNodes& b, float middle
 /// sum += after
 void addSlice(const SliceNodes& after, SliceNodes& sum);
 
-/// Densities at a slice and the ones before and behind it on the light's way, and what lies between them.
-struct Slices {
-  SliceNodes *previous, *density, *next, *before, *after;
-};
-
-/// Writes the 9 x 9 nodes of a slice side by side: `sum` less `share` times what the density grows by in the
-/// cells before and behind it, weighted by what these hold.
-void storeSlice(const SliceNodes& sum, const Slices& at, float share, float* out);
+/// Writes the 9 x 9 nodes of a slice side by side, as bentColumn(sum, bend).
+void storeSlice(const SliceNodes& sum, float bend, float* out);
 
 /// Calls visit(first, end) for the runs of bricks with density among the `count` of a column, whose pool
 /// bricks poolAt(n) tells: 0 where there is none.

@@ -1,9 +1,10 @@
 // Sweeps: for each of a few directions light is carried slice by slice through the lattice, read between the
-// nodes of the slice before. A cell of optical depth t and own light S per optical depth lets through I
-// exp(-t) + S (1 - exp(-t)), and holds S + (I - S) (1 - exp(-t)) / t on average: what it takes and gives away
-// is what these differ by, so that no light is lost. S comes from the moments of all light in the cell, and
-// every direction adds to these. Rows of a slice are shared out among threads; each is added to in a fixed
-// order.
+// nodes of the slice before, by cubics, since linear interpolation would spread it by half a cell per slice:
+// first along rows, when they are written, then across. A cell of optical depth t and own light S per optical
+// depth lets through I exp(-t) + S (1 - exp(-t)), and holds S + (I - S) (1 - exp(-t)) / t on average: what it
+// takes and gives away is what these differ by, so that no light is lost. S comes from the moments of all
+// light in the cell, and every direction adds to these. Rows of a slice are shared out among threads; each is
+// added to in a fixed order.
 #include "nephele/render/light/detail/light_sweep.h"
 
 #include <algorithm>
@@ -17,8 +18,6 @@ namespace nephele::detail {
 namespace {
 
 constexpr int kVector = CellRows::kVector;
-// Cells around slices, through which light comes in.
-constexpr int kRim = 1;
 
 // Lattices with fewer cells are swept by a thread per axis: waiting for each other after every slice would
 // take longer than the work.
@@ -54,6 +53,12 @@ void forEachSquare(const CellRows& plain, From* from, const CellRows& turned, To
           }
         }
   });
+}
+
+// What four values in a row count for at the place f between the middle two: Lagrange's interpolation.
+std::array<float, 4> cubic(float f) {
+  const float g = 1 - f;
+  return {-f * g * (1 + g) / 6, g * (1 + f) * (1 + g) / 2, f * (1 + f) * (1 + g) / 2, -f * g * (1 + f) / 6};
 }
 
 // Copies the values of cells to those that are turned.
@@ -187,6 +192,7 @@ struct LightSweep::Wave {
   SliceWork work;
   std::array<std::vector<float>, 4> before, here;
   std::size_t offsets[4];
+  float inflow[4];
 };
 
 LightSweep::Wave LightSweep::wave(const Group& group, const Moments& moments, Moments& sums,
@@ -195,7 +201,7 @@ LightSweep::Wave LightSweep::wave(const Group& group, const Moments& moments, Mo
   // Axes along a row, from row to row and from slice to slice.
   const int u = group.axis == 0 ? 1 : 0, v = group.axis == 2 ? 1 : 2, w = group.axis;
   const Vec3i n = plain_.rows->size();
-  const std::size_t planeStride = std::size_t(n[u] + 2 * kRim + kVector);
+  const std::size_t planeStride = std::size_t(n[u]);
   Wave wave;
   SliceWork& work = wave.work;
   work.width = n[u];
@@ -212,18 +218,19 @@ LightSweep::Wave LightSweep::wave(const Group& group, const Moments& moments, Mo
   for (std::size_t k = 0; k != 4; ++k) {
     const std::size_t ordinate = group.ordinates[k];
     const Vec3f way = ordinates_[ordinate].way;
-    wave.before[k].assign(planeStride * std::size_t(n[v] + 2 * kRim), hasInflow ? inflow_[ordinate] : 0.0f);
+    wave.inflow[k] = hasInflow ? inflow_[ordinate] : 0.0f;
+    wave.before[k].assign(planeStride * std::size_t(n[v] + 2 * SliceWork::kRim), wave.inflow[k]);
     wave.here[k] = wave.before[k];
     const float du = -way[u] / std::fabs(way[w]), dv = -way[v] / std::fabs(way[w]);
     const int iu = std::min(int(std::floor(du)), 0), iv = std::min(int(std::floor(dv)), 0);
-    const float fu = du - float(iu), fv = dv - float(iv);
-    const float shares[4] = {(1 - fu) * (1 - fv), fu * (1 - fv), (1 - fu) * fv, fu * fv};
-    std::copy_n(shares, 4, work.ways[k].shares);
+    work.ways[k].first = iu - 1;
+    work.ways[k].along = cubic(du - float(iu));
+    work.ways[k].across = cubic(dv - float(iv));
     const float perCell = scattered_ / std::fabs(way[w]);
     work.ways[k].slopes[0] = perCell * way[u];
     work.ways[k].slopes[1] = perCell * way[v];
     work.ways[k].slopes[2] = perCell * way[w];
-    wave.offsets[k] = std::size_t(iv + kRim) * planeStride + std::size_t(iu + kRim);
+    wave.offsets[k] = std::size_t(iv - 1 + SliceWork::kRim) * planeStride;
   }
   const std::size_t first = group.ordinates[0];
   int count = 0;
@@ -253,12 +260,18 @@ void LightSweep::carry(int axis, bool rises, const Moments& moments, Moments& su
       wave.work.rows = rows.rows().data() + std::size_t(rises ? slice : slices - 1 - slice) * sliceStride;
       for (std::size_t k = 0; k != 4; ++k) {
         wave.work.ways[k].before = wave.before[k].data() + wave.offsets[k];
-        wave.work.ways[k].here = wave.here[k].data() + kRim * (wave.work.planeStride + 1);
+        wave.work.ways[k].here = wave.here[k].data() + SliceWork::kRim * wave.work.planeStride;
       }
     }
     parallelFor(std::size_t(height), grain, [&](std::size_t begin, std::size_t end) {
+      const std::size_t length = std::size_t(waves[0].work.width + 2 * SliceWork::kRim);
+      std::vector<float> carried(4 * length);
       for (Wave& wave : waves) {
         SliceWork work = wave.work;
+        for (std::size_t k = 0; k != 4; ++k) {
+          work.ways[k].row = carried.data() + k * length;
+          std::fill_n(work.ways[k].row, length, wave.inflow[k]);
+        }
         work.rowBegin = int(begin);
         work.rowEnd = int(end);
         carrySlice(work);

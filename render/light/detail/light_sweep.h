@@ -35,14 +35,21 @@ struct SliceWork {
   std::array<int, 4> ends{};
   /// Every other one differs from the first in its sign along the row, the last two from row to row.
   struct Way {
-    /// The slice before at the first of four cells that light comes in from, and this slice.
+    /// Mixed along rows: the slice before, at the first of four rows that light comes in from, and this one.
     const float* before;
     float* here;
-    float shares[4];
+    /// A row before it is mixed, behind kRim cells of what comes in from outside.
+    float* row;
+    /// The first of four cells along a row that are mixed, from the one that they are mixed for.
+    int first;
+    std::array<float, 4> along, across;
     /// Of the way through a cell, times the phase function's first moment.
     float slopes[3];
   } ways[4];
   std::size_t planeStride = 0;
+
+  /// Cells around a row, and rows around a slice, through which light comes in.
+  static constexpr int kRim = 2;
 };
 
 void carrySlice(const SliceWork& work);

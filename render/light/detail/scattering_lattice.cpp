@@ -18,10 +18,13 @@ ScatteringLattice halved(const ScatteringLattice& fine) {
           const std::size_t from = fine.index(x, y, z), to = coarse.index(x / 2, y / 2, z / 2);
           coarse.density[to] += fine.density[from];
           coarse.beam[to] += fine.density[from] * fine.beam[from];
+          const Vec3f half = Vec3f(Vec3i{x & 1, y & 1, z & 1}) - Vec3f{0.5f, 0.5f, 0.5f};
+          coarse.centre[to] = coarse.centre[to] + (fine.centre[from] + half) * (0.5f * fine.density[from]);
         }
     for (std::size_t i = begin * perSlice; i != end * perSlice; ++i) {
       if (!(coarse.density[i] > 0)) continue;
       coarse.beam[i] /= coarse.density[i];
+      coarse.centre[i] = coarse.centre[i] * (1 / coarse.density[i]);
       coarse.density[i] /= 8;
     }
   });

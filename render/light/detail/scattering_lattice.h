@@ -17,12 +17,15 @@ struct ScatteringLattice {
   float voxels;
   /// Mean density of every cell, and the first source of light where its density is, see ScatteredLight.
   std::vector<float> density, beam;
+  /// Where the centre of mass of its density is, from its middle, in cells.
+  std::vector<Vec3f> centre;
 
   ScatteringLattice(const Vec3i& n, float edge)
       : size{rounded(n.x), rounded(n.y), n.z},
         voxels(edge),
         density(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z)),
-        beam(density.size()) {}
+        beam(density.size()),
+        centre(density.size()) {}
   static constexpr int rounded(int n) {
     return (n + CellRows::kVector - 1) / CellRows::kVector * CellRows::kVector;
   }

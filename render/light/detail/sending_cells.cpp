@@ -79,7 +79,7 @@ void sendOf(detail::SendingCells& cells) {
     });
     const CellFloats sent = hn::Mul(beam, hn::LoadU(d, cells.beam + x)), own = hn::Sub(light, sent);
     hn::Store(own, d, cells.own + x);
-    hn::Store(hn::MulAdd(sent, hn::Set(d, cells.ofBeam), own), d, cells.all + x);
+    hn::Store(sent, d, cells.ofBeam + x);
   }
 }
 

@@ -22,15 +22,13 @@ struct SendingCells {
   /// Harmonics of the beam's way, all but the first 0 where it has none, unless it comes from a place.
   const float* beamWay = nullptr;
   const Vec3f* beamPlace = nullptr;
-  /// What of the beam counts as scattered in `all`.
-  float ofBeam = 0;
 
-  /// The light that is sent, without what the beam sends and with its share.
+  /// The light that is sent, without what the beam sends, and that.
   alignas(32) float own[CellRows::kVector] = {};
-  alignas(32) float all[CellRows::kVector] = {};
+  alignas(32) float ofBeam[CellRows::kVector] = {};
 };
 
-/// Sets `own` and `all`.
+/// Sets `own` and `ofBeam`.
 void send(SendingCells& cells);
 
 }  // namespace nephele::detail

@@ -15,13 +15,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 using RowLanes = hn::CappedTag<float, detail::CellRows::kVector>;
 using RowFloats = hn::Vec<RowLanes>;
 
-HWY_INLINE RowFloats comesIn(const detail::SliceWork::Way& way, std::size_t at, std::size_t planeStride) {
+// Of four places that are `apart`. Mirrored light has the same bits.
+HWY_INLINE RowFloats mixed(const std::array<float, 4>& shares, const float* from, std::size_t apart) {
   const RowLanes d;
-  const float *a = way.before + at, *b = a + planeStride;
-  // Products first, then sums of pairs, so that mirrored light has the same bits.
-  const auto share = [&](int n, const float* from)
-                         HWY_ATTR { return hn::Mul(hn::Set(d, way.shares[n]), hn::LoadU(d, from)); };
-  return hn::Add(hn::Add(share(0, a), share(1, a + 1)), hn::Add(share(2, b), share(3, b + 1)));
+  const auto share = [&](std::size_t n)
+                         HWY_ATTR { return hn::Mul(hn::Set(d, shares[n]), hn::LoadU(d, from + n * apart)); };
+  return hn::Add(hn::Add(share(0), share(3)), hn::Add(share(1), share(2)));
 }
 
 // What a cell takes of the light that comes in, and holds on average of it; the same of what its own light
@@ -52,17 +51,16 @@ void carrySliceOf(const detail::SliceWork& work) {
   for (int row = work.rowBegin; row != work.rowEnd; ++row) {
     const std::size_t plane = std::size_t(row) * work.planeStride;
     const auto [first, begin, end] = work.rows[std::size_t(row) * work.rowStride];
+    const auto comesIn = [&](const detail::SliceWork::Way& way, int x)
+                             HWY_ATTR { return mixed(way.across, way.before + plane + x, work.planeStride); };
     const auto pass = [&](int from, int to) HWY_ATTR {
       for (const detail::SliceWork::Way& way : work.ways)
         for (int x = from; x < to; x += lanes)
-          hn::StoreU(comesIn(way, plane + std::size_t(x), work.planeStride), d, way.here + plane + x);
+          hn::StoreU(comesIn(way, x), d, way.row + detail::SliceWork::kRim + x);
     };
-    if (begin >= end) {
-      pass(0, work.width);
-      continue;
-    }
-    pass(0, begin);
-    for (int x = begin; x < end; x += lanes) {
+    const bool holdsNone = begin >= end;
+    pass(0, holdsNone ? work.width : begin);
+    for (int x = begin; !holdsNone && x < end; x += lanes) {
       const std::size_t at = std::size_t(first + x);
       const std::size_t momentsAt = detail::CellRows::momentsAt(at, work.momentCount);
       const float* HWY_RESTRICT moments = work.moments + momentsAt;
@@ -77,7 +75,7 @@ void carrySliceOf(const detail::SliceWork& work) {
         parts[kind] = sum;
       }
       // Of all four directions, and back: mirrored light has the same bits.
-      const auto mixed = [&](const RowFloats(&from)[4], RowFloats(&to)[4]) HWY_ATTR {
+      const auto together = [&](const RowFloats(&from)[4], RowFloats(&to)[4]) HWY_ATTR {
         const RowFloats a = hn::Add(from[0], from[1]), b = hn::Sub(from[0], from[1]),
                         c = hn::Add(from[2], from[3]), e = hn::Sub(from[2], from[3]);
         to[0] = hn::Add(a, c);
@@ -86,7 +84,7 @@ void carrySliceOf(const detail::SliceWork& work) {
         to[3] = hn::Sub(b, e);
       };
       RowFloats own[4];
-      mixed(parts, own);
+      together(parts, own);
       const RowFloats depth = hn::Min(
           hn::Mul(hn::Set(d, work.depthPerDensity), hn::LoadU(d, work.density + at)), hn::Set(d, 80.0f));
       const Shares cell = sharesOf(depth);
@@ -94,8 +92,7 @@ void carrySliceOf(const detail::SliceWork& work) {
                       slope2 = hn::LoadU(d, work.slopes[2] + at);
       const auto carried = [&](int k, RowFloats its) HWY_ATTR {
         const detail::SliceWork::Way& way = work.ways[k];
-        const RowFloats in = comesIn(way, plane + std::size_t(x), work.planeStride),
-                        excess = hn::Sub(in, its);
+        const RowFloats in = comesIn(way, x), excess = hn::Sub(in, its);
         RowFloats grows = hn::MulAdd(
             hn::Set(d, way.slopes[0]), slope0,
             hn::MulAdd(hn::Set(d, way.slopes[1]), slope1, hn::Mul(hn::Set(d, way.slopes[2]), slope2)));
@@ -103,12 +100,12 @@ void carrySliceOf(const detail::SliceWork& work) {
         const RowFloats most = hn::Abs(hn::Add(its, its));
         grows = hn::Min(hn::Max(grows, hn::Neg(most)), most);
         hn::StoreU(hn::MulAdd(grows, cell.takenSlope, hn::NegMulAdd(excess, cell.taken, in)), d,
-                   way.here + plane + x);
+                   way.row + detail::SliceWork::kRim + x);
         return hn::NegMulAdd(grows, cell.meanSlope, hn::MulAdd(excess, cell.mean, its));
       };
       const RowFloats means[4] = {carried(0, own[0]), carried(1, own[1]), carried(2, own[2]),
                                   carried(3, own[3])};
-      mixed(means, parts);
+      together(means, parts);
       for (int kind = 0, n = 0; kind != 4; ++kind)
         for (; n != work.ends[std::size_t(kind)]; ++n) {
           const detail::SliceWork::Part& part = work.parts[std::size_t(n)];
@@ -116,7 +113,11 @@ void carrySliceOf(const detail::SliceWork& work) {
           hn::StoreU(hn::MulAdd(hn::Set(d, part.sum), parts[kind], hn::LoadU(d, sum)), d, sum);
         }
     }
-    pass(end, work.width);
+    if (!holdsNone) pass(end, work.width);
+    for (const detail::SliceWork::Way& way : work.ways)
+      for (int x = 0; x < work.width; x += lanes)
+        hn::StoreU(mixed(way.along, way.row + detail::SliceWork::kRim + way.first + x, 1), d,
+                   way.here + plane + x);
   }
 }
 

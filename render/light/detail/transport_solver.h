@@ -53,13 +53,14 @@ class TransportSolver {
   struct Level {
     ScatteringLattice lattice;
     CellRows rows;
-    // Of the cells that are kept.
-    std::vector<float> density;
+    // Of the cells that are kept in `rows`, and what share of its light each takes itself.
+    std::vector<float> density, taken;
     std::unique_ptr<LightSweep> sweep;
   };
 
   void iterate(std::size_t level, Moments& light, const std::function<void(Moments&)>& add, bool hasInflow,
                const Limits& limits, const Progress& progress);
+  void addTaken(std::size_t level, const Moments& light, Moments& swept) const;
   void addCoarse(std::size_t level, const Moments& light, Moments& swept, const Progress& progress);
 
   void extrapolate(const Moments& coarser, Moments& light) const;

@@ -82,8 +82,7 @@ inline void Marcher<kColours>::lightAll() {
 template <int kColours>
 inline void Marcher<kColours>::light(const LitPart<kColours>& steps) {
   readLight();
-  located_ = steps;
-  isLocated_ = true;
+  located_ = steps, isLocated_ = true;
   for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun)
     locate<CodedBricks::kWidth>(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun]);
   if (!scene_.scattered.empty())
@@ -96,7 +95,8 @@ inline void Marcher<kColours>::readLight() {
   const Lanes d;
   const LitPart<kColours>& steps = located_;
   for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-    const Floats column = readCoded(scene_.suns[sun], places_[sun]);
+    const Floats bent = readCoded(scene_.suns[sun], places_[sun]), bend = hn::Set(d, scene_.suns[sun].bend),
+                 column = hn::Sub(hn::Sqrt(hn::MulAdd(bent, bent, hn::Mul(bend, bend))), bend);
     // Of every colour of the result, and one where a weight is all colours'.
     const int colours = kColours == 1 ? scene_.colours : kColours;
     Floats sums[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};

@@ -56,9 +56,9 @@ TEST(LightVolume, MeasuresTheWayThroughASlab) {
   }
 }
 
-TEST(LightVolume, IsExactAcrossALightAlongAnAxis) {
-  // Columns of equal density: linear interpolation between them is the density's own, times the length of
-  // the way to the upper end, half a voxel of which is the ramp to zero.
+TEST(LightVolume, InterpolatesBentColumnsAcrossALightAlongAnAxis) {
+  // Columns of equal density: each is that, times the length of the way to the upper end, half a voxel of
+  // which is the ramp to zero. Between them sqrt(c^2 + 2 a c) is linear.
   const auto densityAt = [](int x, int y) { return 0.5 + 0.5 * std::sin(2.3 * x + 1.7 * y * y); };
   const RenderVolume volume(densityGrid(voxels(1), {-9, -9, -20}, {9, 9, 20}, [&](const Vec3f& p) {
     return float(densityAt(int(std::lround(p.x)), int(std::lround(p.y))));
@@ -68,9 +68,29 @@ TEST(LightVolume, IsExactAcrossALightAlongAnAxis) {
     const double x = 6 * std::sin(i * 1.3), y = 6 * std::sin(i * 2.1 + 1);
     const int z = i % 16 - 10, u = int(std::floor(x)), v = int(std::floor(y));
     const double fx = x - u, fy = y - v;
-    const double density = (1 - fy) * ((1 - fx) * densityAt(u, v) + fx * densityAt(u + 1, v)) +
-                           fy * ((1 - fx) * densityAt(u, v + 1) + fx * densityAt(u + 1, v + 1));
-    EXPECT_NEAR(light.columnDensity({float(x), float(y), float(z)}), density * (20.5 - z), 1e-4) << i;
+    const double a = light.bend();
+    const auto bent = [&](int at, int over) {
+      const double column = densityAt(at, over) * (20.5 - z);
+      return std::sqrt(column * column + 2 * a * column);
+    };
+    const double mixed = (1 - fy) * ((1 - fx) * bent(u, v) + fx * bent(u + 1, v)) +
+                         fy * ((1 - fx) * bent(u, v + 1) + fx * bent(u + 1, v + 1));
+    EXPECT_NEAR(light.columnDensity({float(x), float(y), float(z)}), std::sqrt(mixed * mixed + a * a) - a,
+                1e-4)
+        << i;
+    EXPECT_NEAR(light.columnDensity({float(u), float(v), float(z)}), densityAt(u, v) * (20.5 - z), 1e-4) << i;
+  }
+}
+
+TEST(LightVolume, CountsDensityAboveTheMostAsThat) {
+  // The same as a volume of that density where no voxel has less.
+  const RenderVolume dense(slab(1.1f, 4.0f, 0.1f, 1.5f)), thin(slab(1.1f, 4.0f, 0.1f, 0.4f));
+  for (const Vec3f& towards : {Vec3f{0, 0, 1}, Vec3f{0.6f, 0, 0.8f}, Vec3f{-0.3f, 0.4f, 0.6f}}) {
+    const LightVolume capped(dense, towards, {.most = 0.4f}), light(thin, towards);
+    for (const float z : {-0.4f, 0.0f, 0.3f, 0.5f}) {
+      const Vec3f p{0.013f, -0.021f, z};
+      EXPECT_NEAR(capped.columnDensity(p), light.columnDensity(p), 1e-6f) << z;
+    }
   }
 }
 
@@ -238,7 +258,10 @@ TEST(LightVolume, CodesTheSameWhileItWorksAndAfterwards) {
           const float* values = floats.values().data() + std::size_t(pool) * nodes;
           const auto [least, most] = std::minmax_element(values, values + nodes);
           const bool isEmpty = *least == 0 && *most == 0;
-          ASSERT_EQ(own, *least > dark ? 1 : isEmpty ? 0 : std::max(own, lastShared + 1)) << place;
+          ASSERT_EQ(own, *least > detail::bentColumn(dark, floats.bend()) ? 1
+                         : isEmpty                                        ? 0
+                                                                          : std::max(own, lastShared + 1))
+              << place;
           left += own <= lastShared;
           if (own <= lastShared) continue;
         } else {
