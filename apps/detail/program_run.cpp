@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -18,11 +18,11 @@
 namespace nephele::apps {
 namespace {
 
-volatile std::sig_atomic_t receivedSignal = 0;
+// Any thread may be the one that is interrupted, and others look at it.
+std::atomic<int> receivedSignal = 0;
+static_assert(std::atomic<int>::is_always_lock_free, "what a signal handler may write");
 
 extern "C" void onStopSignal(int signal) {
-  // What it interrupts may be about to look at it.
-  const int error = errno;
   if (receivedSignal != 0) {
     discardAllOutputs();
     // Only what signal handlers may call.
@@ -31,7 +31,6 @@ extern "C" void onStopSignal(int signal) {
     _exit(128 + signal);
   }
   receivedSignal = signal;
-  errno = error;
 }
 
 /// On stderr. What cannot be printed is lost: a note must not fail a job.
