@@ -16,7 +16,7 @@ namespace nephele::detail {
 class TransportSolver {
  public:
   /// Cells away from density whose light is known, too.
-  static constexpr int kReach = 2;
+  static constexpr int kReach = 1;
 
   struct Medium {
     /// Per density and cell of the finest lattice.
