@@ -60,7 +60,7 @@ void carrySliceOf(const detail::SliceWork& work) {
     };
     const bool holdsNone = begin >= end;
     pass(0, holdsNone ? work.width : begin);
-    for (int x = begin; !holdsNone && x < end; x += lanes) {
+    for (int x = begin; x < end; x += lanes) {
       const std::size_t at = std::size_t(first + x);
       const std::size_t momentsAt = detail::CellRows::momentsAt(at, work.momentCount);
       const float* HWY_RESTRICT moments = work.moments + momentsAt;
