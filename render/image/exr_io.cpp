@@ -178,16 +178,22 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
   });
 
   Imf::FrameBuffer frame;
-  std::vector<std::vector<half>> halves;
-  halves.reserve(image.channels.size());
+  std::vector<std::vector<half>> halves(image.channels.size());
+  parallelFor(halves.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c != end; ++c) {
+      const Image::Channel& channel = image.channels[c];
+      if (!channel.half) continue;
+      halves[c].resize(channel.values.size());
+      std::transform(channel.values.begin(), channel.values.end(), halves[c].begin(), toHalf);
+    }
+  });
   const auto pitch = std::size_t(image.width);
-  for (const Image::Channel& channel : image.channels) {
+  for (std::size_t c = 0; c != halves.size(); ++c) {
+    const Image::Channel& channel = image.channels[c];
     header.channels().insert(channel.name, Imf::Channel(channel.half ? Imf::HALF : Imf::FLOAT));
     if (channel.half) {
-      std::vector<half>& values = halves.emplace_back(channel.values.size());
-      std::transform(channel.values.begin(), channel.values.end(), values.begin(), toHalf);
       frame.insert(channel.name,
-                   Imf::Slice::Make(Imf::HALF, values.data(), window, sizeof(half), pitch * sizeof(half)));
+                   Imf::Slice::Make(Imf::HALF, halves[c].data(), window, sizeof(half), pitch * sizeof(half)));
     } else {
       frame.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.values.data(), window, sizeof(float),
                                                   pitch * sizeof(float)));

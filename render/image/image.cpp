@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <string_view>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/printable.h"
 
 namespace nephele {
@@ -54,13 +56,16 @@ void Image::check() const {
 }
 
 std::size_t notFiniteCount(const Image& image) {
-  std::size_t count = 0;
-  for (const Image::Channel& channel : image.channels) {
-    const bool isDepth = channel.name == "Z" || channel.name.starts_with("Z_");
-    count += std::size_t(std::ranges::count_if(
-        channel.values, [&](float v) { return !std::isfinite(v) && !(isDepth && std::isinf(v)); }));
-  }
-  return count;
+  std::vector<std::size_t> counts(image.channels.size());
+  parallelFor(counts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c != end; ++c) {
+      const Image::Channel& channel = image.channels[c];
+      const bool isDepth = channel.name == "Z" || channel.name.starts_with("Z_");
+      counts[c] = std::size_t(std::ranges::count_if(
+          channel.values, [&](float v) { return !std::isfinite(v) && !(isDepth && std::isinf(v)); }));
+    }
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::size_t(0));
 }
 
 }  // namespace nephele

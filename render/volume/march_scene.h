@@ -134,9 +134,11 @@ struct MarchScene {
   int skyParts = 1;
 
   /// Longest step: `step`, `uniformStep` in bricks whose density hardly varies, or the width of a pixel if
-  /// that is larger (up to 4 steps). Within a brick no more than an optical depth of `stepDepth` in its
-  /// densest voxel, but at least `leastStep`.
+  /// that is larger (up to 4 steps); or `divided` times the smaller of step and pixel. Within a brick no more
+  /// than an optical depth of `stepDepth` in its densest voxel, but at least `leastStep`.
   float step = 1.0f, uniformStep = 1.0f, leastStep = 0.125f, stepDepth = 0.5f;
+  /// More than 1 where the rays of a pixel divide each other's steps.
+  float divided = 1.0f;
   /// Times this at most, steps grow with the optical depth in front of them, since less is seen of them.
   float mostGrowth = 4.0f;
   /// Width of a pixel per distance.

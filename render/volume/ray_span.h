@@ -22,8 +22,8 @@ inline RaySpan clipped(RaySpan span, const Vec3d& origin, const Vec3d& direction
       if (origin[axis] < box.min[axis] || origin[axis] > box.max[axis]) return {0, 0};
       continue;
     }
-    const double a = (box.min[axis] - origin[axis]) / direction[axis],
-                 b = (box.max[axis] - origin[axis]) / direction[axis];
+    const double inverse = 1 / direction[axis], a = (box.min[axis] - origin[axis]) * inverse,
+                 b = (box.max[axis] - origin[axis]) * inverse;
     span.near = std::max(span.near, std::min(a, b));
     span.far = std::min(span.far, std::max(a, b));
   }

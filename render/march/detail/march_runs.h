@@ -26,7 +26,8 @@ inline float opaqueDepth(const MarchScene& scene) {
 /// promise that nothing is left to see. `density` is negative where it has to be looked up.
 ///
 /// Runs go on from brick to brick where bricks touch, so that their borders leave no trace, and start anew
-/// behind a gap. Steps grow with the optical depth that the ranges of the bricks in front promise.
+/// behind a gap. Steps grow with the optical depth that the ranges of the bricks in front promise. All of it
+/// is inlined, so that it is compiled for the instructions of the kernel around it.
 template <class Take>
 class Runs {
  public:
@@ -42,68 +43,71 @@ class Runs {
     const float thickest = scene_.extinction * range.max;
     const float least =
         std::max(thickest * wide > scene_.stepDepth ? scene_.stepDepth / thickest : wide, scene_.leastStep);
-    if (isUniform) return addUniform(s0, s1, range, least);
+    const float depth = depth_ + (isUniform_ ? thinnest_ * (end_ - start_) : 0.0f),
+                growth = isUniform_ ? stepGrowth(scene_, depth) : growth_;
     // Where the density varies it must still be met at every voxel.
-    const float ds = std::min(least * growth_, std::max(least, scene_.step));
-    if (s0 > end_ || ds != ds_ || density_ >= 0) {
+    const float ds = isUniform ? least : std::min(least * growth, std::max(least, scene_.step));
+    const bool isSame = isUniform == isUniform_ && !(s0 > end_) &&
+                        (isUniform ? range.isPoint() && range.max == density_ : ds == ds_),
+               isLong = isUniform_ ? !(depth < opaque_) : !((end_ - start_) * perStep_ < kMany);
+    if (!isSame || isLong) {
       if (!close()) return false;
-      open(s0, ds, 1.0f / ds, -1.0f);
+      start_ = std::max(start_, s0);
+      ds_ = ds, perStep_ = 1.0f / ds;
+      isUniform_ = isUniform;
+      density_ = isUniform && range.isPoint() ? range.max : -1.0f;
+      thinnest_ = scene_.extinction * std::max(range.min, 0.0f);
     }
     end_ = s1;
-    if (range.min > 0) promise(scene_.extinction * range.min * (s1 - std::max(s0, start_)));
-    return (end_ - start_) * perStep_ < kMany || close();
+    if (!isUniform && range.min > 0) promise(scene_.extinction * range.min * (s1 - std::max(s0, start_)));
+    return true;
   }
 
-  bool close() {
+  [[gnu::always_inline]] bool close() {
     if (!(start_ < end_)) return true;
+    if (isUniform_) return closeUniform();
     float ds = ds_;
     const int count = int(std::ceil((end_ - start_) * perStep_));
     if (ray_.isCut && end_ >= ray_.length) ds = (end_ - start_) / float(count);
     const float start = std::exchange(start_, start_ + float(count) * ds);
     end_ = start_;
-    return take_(start, ds, count, density_) && depth_ < opaque_;
+    return take_(start, ds, count, -1.0f) && depth_ < opaque_;
   }
 
  private:
   // Enough steps to be worth a call.
   static constexpr float kMany = 64;
 
-  // From `s`, or where the last step before it ends.
-  void open(float s, float ds, float perStep, float density) {
-    start_ = std::max(start_, s);
-    ds_ = ds, perStep_ = perStep, density_ = density;
-  }
-
   // Steps as wide as pixels are, and by a tenth wider in turn, so that runs are long.
-  void widen(float s) {
-    const float pixel = scene_.pixelAngle * (ray_.start + s);
-    widest_ = std::max(scene_.step, std::min(4.0f * scene_.step, pixel));
+  [[gnu::always_inline]] void widen(float s) {
+    const float pixel = scene_.pixelAngle * (ray_.start + s),
+                divided = scene_.divided * std::min(pixel, scene_.step);
+    widest_ = std::max({scene_.step, std::min(4.0f * scene_.step, pixel), divided});
     widestUniform_ = std::max(scene_.uniformStep, widest_);
-    farther_ = pixel > 0 ? std::max(1.1f * pixel, scene_.step) / scene_.pixelAngle - ray_.start : INFINITY;
+    const float next = std::max(1.1f * pixel, scene_.step / scene_.divided);
+    farther_ = pixel > 0 ? next / scene_.pixelAngle - ray_.start : INFINITY;
   }
 
-  void promise(float depth) {
+  [[gnu::always_inline]] void promise(float depth) {
     depth_ += depth;
     growth_ = stepGrowth(scene_, depth_);
   }
 
   // Steps may be longer than voxels, of lengths that grow.
-  bool addUniform(float s0, float s1, const Interval& range, float least) {
-    if (!close()) return false;
-    const float thinnest = scene_.extinction * std::max(range.min, 0.0f),
-                density = range.isPoint() ? range.max : -1.0f;
-    for (float cursor = std::max(start_, s0); cursor < s1;) {
-      float ds = least * growth_;
+  [[gnu::always_inline]] bool closeUniform() {
+    const float s1 = end_;
+    for (float cursor = start_; cursor < s1;) {
+      float ds = ds_ * growth_;
       // As far as the growth is about the same.
       const float end =
-          thinnest * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest, ds)) : s1;
+          thinnest_ * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest_, ds)) : s1;
       const int count = int(std::ceil((end - cursor) / ds));
       // The last of them must not reach into a brick that differs.
       if (end == s1) ds = (s1 - cursor) / float(count);
       const float start = std::exchange(cursor, cursor + float(count) * ds);
-      promise(thinnest * (std::min(cursor, s1) - start));
+      promise(thinnest_ * (std::min(cursor, s1) - start));
       start_ = end_ = cursor;
-      if (!take_(start, ds, count, density) || !(depth_ < opaque_)) return false;
+      if (!take_(start, ds, count, density_) || !(depth_ < opaque_)) return false;
     }
     return true;
   }
@@ -113,10 +117,14 @@ class Runs {
   Take& take_;
   const float opaque_;
   // The run so far: where it began and how far it has to go.
-  float start_ = 0.0f, end_ = 0.0f, ds_ = 0.0f, perStep_ = 0.0f, density_ = -1.0f;
+  float start_ = 0.0f, end_ = 0.0f, ds_ = 0.0f, perStep_ = 0.0f;
+  // Whether its density hardly varies: then it is constant where this is not negative, and `thinnest_` is the
+  // least optical depth per length.
+  bool isUniform_ = false;
+  float density_ = -1.0f, thinnest_ = 0.0f;
   // Of steps from here to `farther_`.
   float widest_ = 0.0f, widestUniform_ = 0.0f, farther_ = 0.0f;
-  // At least so much lies in front.
+  // At least so much lies in front of the run, or with it where it varies.
   float depth_ = 0.0f, growth_ = 1.0f;
 };
 

@@ -39,6 +39,9 @@ class Marcher {
         isHeld_(!ray.holdout.empty()),
         needsBegin_(isHeld_ || record) {
     std::fill_n(through_, kColours, 1.0f);
+    // Parts of vectors are put into what is there.
+    for (int i = 0; i != kBlock; i += kLanes)
+      for (float* block : {s_, ds_, begin_, known_}) hn::Store(hn::Zero(Lanes()), Lanes(), block + i);
     for (std::size_t i = 0; i != sumCount(); ++i) sums_[i] = hn::Zero(Lanes());
   }
 
@@ -122,12 +125,9 @@ class Marcher {
   std::size_t holdoutCursor_ = 0;
   // Where in its step a sample is, about.
   float jitter_ = ray_.jitter;
-  alignas(64) float seen_[kBlock];
-  alignas(64) float s_[kBlock] = {};
-  alignas(64) float ds_[kBlock] = {};
-  alignas(64) float begin_[kBlock] = {};
+  alignas(64) float seen_[kBlock], s_[kBlock], ds_[kBlock], begin_[kBlock];
   // Densities, negative where they have to be looked up.
-  alignas(64) float known_[kBlock] = {};
+  alignas(64) float known_[kBlock];
   // Of steps that have them.
   alignas(64) float colours_[kColours][kBlock] = {};
   alignas(64) float glows_[kColours][kBlock] = {};

@@ -20,6 +20,10 @@ float opacityOf(float opticalDepth) {
 // Rays that are marched through a field together: enough for long blocks of points, few enough for the cache.
 constexpr int kFieldRays = 64;
 
+// Voxels that a step may pass over where those of other rays of the pixel lie within it: the error of the
+// bunny at 512 voxels and 1280x720 is 2 % larger with 1.5 than with 1, and 8 % with 2.
+constexpr float kDivided = 1.5f;
+
 }  // namespace
 
 // What is in the way, and nothing of what is seen of it.
@@ -63,16 +67,18 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
   scene_.uniformStep = options.step.value_or(4 * lit.voxelSize);
   // Beside a near light what is seen varies where the density does not.
   if (!scene_.locals.empty()) scene_.uniformStep = scene_.step;
+  isDeep_ = options.deep.has_value();
+  holdout_ = scene.holdout;
   // The rays of a pixel divide each other's steps, so that together they may take longer ones.
   scene_.stepDepth = options.samples == 1 ? 0.25f : 0.5f;
+  // Not where steps are to be seen, as in deep pictures and at holdouts.
+  if (options.samples >= 4 && !options.step && !isDeep_ && !holdout_) scene_.divided = kDivided;
   scene_.leastStep = std::min(scene_.step, lit.voxelSize) / 8;
   scene_.pixelAngle = float(camera_.pixelAngle());
   // The pixels of an orthographic picture are as wide everywhere.
   if (camera_.isOrthographic())
     scene_.step = std::clamp(float(camera_.pixelWidth(0)), scene_.step, 4 * scene_.step);
   if (film.wantsPoints()) preparePoints(film, scene.nextCamera);
-  isDeep_ = options.deep.has_value();
-  holdout_ = scene.holdout;
   // What deep pictures and holdouts cut is measured by steps, whatever is seen of them.
   if (isDeep_ || holdout_) scene_.mostGrowth = 1, scene_.uniformStep = scene_.step;
   surfaces_ = scene.surfaces;
@@ -106,9 +112,9 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
 
 // `reach`: depths along the line of sight beyond which nothing needs to be looked for.
 bool Picture::enter(const Ray& ray, const DepthBounds::Range& reach, MarchRay& out) const {
+  const Vec3d origin = lit_.toDensity.point(ray.origin), direction = lit_.toDensity.vector(ray.direction);
   RaySpan span = field_ ? clipped({}, ray.origin, ray.direction, field_->box())
-                        : clipped({}, lit_.toDensity.point(ray.origin), lit_.toDensity.vector(ray.direction),
-                                  lit_.bounds);
+                        : clipped({}, origin, direction, lit_.bounds);
   if (reach.near > 0) {
     const double perDepth = 1 / dot(ray.direction, camera_.forward());
     span = {std::max(span.near, double(reach.near) * perDepth),
@@ -116,7 +122,7 @@ bool Picture::enter(const Ray& ray, const DepthBounds::Range& reach, MarchRay& o
   }
   if (span.isEmpty()) return false;
   const Vec3d entry = ray.origin + ray.direction * span.near;
-  out.density = lit_.toDensity.ray(entry, ray.direction);
+  out.density = {Vec3f(origin + direction * span.near), Vec3f(direction)};
   out.world = {Vec3f(entry), Vec3f(ray.direction)};
   out.start = float(span.near);
   out.length = float(span.far - span.near);

@@ -7,7 +7,7 @@ namespace nephele::detail {
 
 void Picture::preparePoints(const Film& film, const Camera* nextCamera) {
   pointScene_ = withoutLight(scene_);
-  pointScene_.stepDepth = 0.25f;
+  pointScene_.stepDepth = 0.25f, pointScene_.divided = 1;
   middle_ = camera_.stillAt(0.5);
   if (film.wantsNormals()) normals_.emplace(*lit_.source);
   if (film.wantsPositions()) pixelMotion_.emplace(camera_, shutter_, motion_, nextCamera);
