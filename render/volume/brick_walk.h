@@ -17,7 +17,7 @@ inline constexpr float kVisibleOpacity = 0.005f;
 using Axes [[gnu::vector_size(16)]] = float;
 using AxesInts [[gnu::vector_size(16)]] = std::int32_t;
 
-/// In all places.
+/// The least of the four, in all four places.
 [[gnu::always_inline]] inline Axes leastOf(Axes x) {
   const Axes halves = __builtin_shufflevector(x, x, 2, 3, 0, 1);
   x = x < halves ? x : halves;
