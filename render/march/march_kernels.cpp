@@ -20,6 +20,7 @@
 #include <limits>
 
 #include "nephele/render/march/detail/march_runs.h"
+#include "nephele/render/march/detail/march_walk.h"
 #include "nephele/render/march/detail/marcher_light.h"
 #include "nephele/render/march/detail/marcher_record.h"
 #include "nephele/render/march/detail/marcher_steps.h"
@@ -49,10 +50,15 @@ HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchRe
 void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
                 std::size_t count) {
   const float opaque = detail::opaqueDepth(scene);
+  BrickRows rows;
   marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
-    detail::forEachRun(scene, rays[i], opaque, [&](float s, float ds, int n, float density) {
-      return marcher.take(s, ds, n, density);
-    });
+    const int lane = int(i % kLanes);
+    if (lane == 0)
+      findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, opaque, rows);
+    detail::forEachRun(
+        scene, rays[i], opaque,
+        [&](auto&& visit) HWY_ATTR { forEachBrick(scene, rays[i], opaque, rows, lane, visit); },
+        [&](float s, float ds, int n, float density) { return marcher.take(s, ds, n, density); });
   });
 }
 

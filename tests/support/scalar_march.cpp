@@ -9,6 +9,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/light/light_volume.h"
 #include "nephele/render/march/detail/march_runs.h"
+#include "nephele/render/volume/brick_walk.h"
 
 namespace nephele::test {
 
@@ -163,8 +164,13 @@ void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays,
   for (std::size_t i = 0; i != rays.size(); ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
+    const auto walk = [&](auto&& visit) {
+      detail::walkBricks(scene, rays[i].density, rays[i].length, [&](float s0, float s1, std::int32_t pool) {
+        return visit(s0, s1, scene.ranges[pool]);
+      });
+    };
     detail::forEachRun(
-        scene, rays[i], detail::opaqueDepth(scene), [&](float start, float ds, int count, float) {
+        scene, rays[i], detail::opaqueDepth(scene), walk, [&](float start, float ds, int count, float) {
           for (int n = 0; n != count; ++n)
             if (!stepScalar(scene, rays[i], start + (float(n) + rays[i].jitter) * ds, ds, results[i]))
               return false;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "nephele/render/volume/brick_walk.h"
+#include "nephele/render/march/march_kernels.h"
 
 namespace nephele::detail {
 
@@ -34,9 +34,8 @@ class Runs {
   Runs(const MarchScene& scene, const MarchRay& ray, float opaque, Take& take)
       : scene_(scene), ray_(ray), take_(take), opaque_(opaque) {}
 
-  /// The part of a brick of the pool from s0 to s1. False once there is no need to go on.
-  [[gnu::always_inline]] bool add(float s0, float s1, std::int32_t pool) {
-    const Interval& range = scene_.ranges[pool];
+  /// A brick of this range from s0 to s1. False once there is no need to go on.
+  [[gnu::always_inline]] bool add(float s0, float s1, const Interval& range) {
     const bool isUniform = range.max - range.min < 0.01f * range.max;
     if (s0 >= farther_) widen(s0);
     const float wide = isUniform ? widestUniform_ : widest_;
@@ -128,16 +127,14 @@ class Runs {
   float depth_ = 0.0f, growth_ = 1.0f;
 };
 
-template <class Take>
+/// walk(visit) calls visit(s0, s1, range) for every brick with density, near to far, until it returns false.
+template <class Walk, class Take>
 [[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, float opaque,
-                                              Take&& take) {
+                                              Walk&& walk, Take&& take) {
   Runs runs(scene, ray, opaque, take);
   bool goesOn = true;
-  walkBricks(
-      scene, ray.density,
-      ray.length, [&](float s0, float s1, std::int32_t pool) __attribute__((always_inline)) {
-        return goesOn = !(s0 < s1) || runs.add(s0, s1, pool);
-      });
+  walk([&](float s0, float s1, const Interval& range)
+           __attribute__((always_inline)) { return goesOn = !(s0 < s1) || runs.add(s0, s1, range); });
   if (goesOn) runs.close();
 }
 

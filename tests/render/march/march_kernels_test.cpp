@@ -81,6 +81,52 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
   }
 }
 
+// Along a row of bricks longer than what is walked at once, of which some are empty, some constant, and some
+// so dense that what is behind them is not seen.
+TEST(MarchKernels, GiveARayTheSameInAnyCompany) {
+  const auto grid = test::densityGrid(test::voxels(0.1f), {-8, -8, -400}, {8, 8, 400}, [](const Vec3f& p) {
+    const float wave = std::sin(0.4f * p.z);
+    return wave > 0.9f ? 1.0f : std::fmax(0.0f, wave + 0.3f * std::sin(9 * p.x + 7 * p.y + 5 * p.z));
+  });
+  const RenderVolume volume(grid);
+  const test::SunColumns sun({volume, {0.3f, 0.8f, 0.4f}});
+  MarchScene scene = test::sceneOf(volume, sun);
+  scene.step = 0.083f;
+  scene.leastStep = 0.0125f;
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != 45; ++i) {
+    // Every third runs exactly along the row, every seventh leaves it soon.
+    const Vec3f side{std::sin(i * 1.3f), std::sin(i * 2.1f + 1), 0},
+        direction = normalize(Vec3f{0, 0, i % 2 ? 1.0f : -1.0f} + side * (i % 3 == 0   ? 0.0f
+                                                                          : i % 7 == 0 ? 0.2f
+                                                                                       : 0.01f)),
+        origin = side * 0.35f + Vec3f{0, 0, i % 2 ? -40.5f : 40.5f};
+    MarchRay& ray = rays.emplace_back();
+    ray.density = through(grid->worldToIndex(), grid->firstBrick(), origin, direction);
+    ray.suns[0] = through(sun.light.worldToLattice(), sun.light.firstBrick(), origin, direction);
+    ray.length = 90;
+    ray.weight[0][0][0] = 1;
+  }
+  for (const float extinction : {0.02f, 0.3f, 20.0f}) {
+    scene.extinction = extinction;
+    std::vector<MarchResult> expected(rays.size());
+    test::marchRaysScalar(scene, rays, expected);
+    test::forEachTarget([&] {
+      std::vector<MarchResult> together(rays.size());
+      marchRays(scene, rays, together);
+      for (std::size_t i = 0; i != rays.size(); ++i) {
+        MarchResult alone;
+        marchRays(scene, {&rays[i], 1}, {&alone, 1});
+        ASSERT_EQ(alone.opticalDepth, together[i].opticalDepth) << i;
+        ASSERT_EQ(alone.suns[0][0], together[i].suns[0][0]) << i;
+        ASSERT_EQ(alone.samples, together[i].samples) << i;
+        ASSERT_NEAR(std::exp(-alone.opticalDepth), std::exp(-expected[i].opticalDepth), 1.1e-4f) << i;
+        ASSERT_NEAR(alone.suns[0][0], expected[i].suns[0][0], 2e-4f) << i;
+      }
+    });
+  }
+}
+
 TEST(HoldoutCurve, SeesItsShareOfAMediumInTheSamePlace) {
   // Optical depth m over [2, 4], and a medium of depth n in the same place: of what both stop, 1 - exp(-m -
   // n), the medium's share is n / (m + n), and all of its own opacity is 1 - exp(-n).

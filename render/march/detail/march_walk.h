@@ -1,0 +1,184 @@
+// No #pragma once: read once for every instruction set, by files that use <hwy/foreach_target.h>.
+#if defined(NEPHELE_MARCH_WALK) == defined(HWY_TARGET_TOGGLE)
+#ifdef NEPHELE_MARCH_WALK
+#undef NEPHELE_MARCH_WALK
+#else
+#define NEPHELE_MARCH_WALK
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "nephele/render/march/detail/march_lanes.h"
+#include "nephele/render/march/detail/march_loads.h"
+#include "nephele/render/march/march_kernels.h"
+
+/// The walk through bricks of a vector of rays.
+HWY_BEFORE_NAMESPACE();
+namespace nephele::HWY_NAMESPACE {
+
+// The bricks with density that a vector of rays passes, near to far, each with its range. A row has one of
+// every ray, or a piece of no length.
+struct BrickRows {
+  // Most rays end before.
+  static constexpr int kMost = 32;
+
+  int count = 0;
+  alignas(64) float begin[kMost][kLanes], end[kMost][kLanes], least[kMost][kLanes], most[kMost][kLanes];
+  // Where the walk of each goes on behind the last row; infinite where nothing is left to be met or seen.
+  alignas(64) float rest[kLanes];
+};
+
+// The rays' walk along one axis, see walkBricks.
+struct AxisWalk {
+  Floats origin, direction, perPlane, zeroth, step, plane, exit;
+  // Of the table's entries, towards larger bricks and the way that the ray goes.
+  Ints across, stride, forward, last;
+
+  HWY_INLINE Floats meets(Floats at) const { return hn::MulAdd(at, perPlane, zeroth); }
+
+  HWY_INLINE Ints brickAt(Floats s) const {
+    const Floats at = hn::Mul(hn::MulAdd(s, direction, origin), hn::Set(Lanes(), 0.125f));
+    return hn::Min(hn::Max(hn::ConvertTo(IntLanes(), at), hn::Zero(IntLanes())), last);
+  }
+
+  HWY_INLINE void set(const float* origins, const float* directions, int count, int entries) {
+    const Lanes d;
+    const IntLanes i;
+    origin = hn::Load(d, origins), direction = hn::Load(d, directions);
+    const auto isForward = hn::Gt(direction, hn::Zero(d)),
+               crosses = hn::Gt(hn::Abs(direction), hn::Set(d, 1e-30f));
+    const Floats inverse = hn::Div(hn::Set(d, 1.0f), direction);
+    perPlane = hn::IfThenElseZero(crosses, hn::Mul(hn::Set(d, 8.0f), inverse));
+    zeroth = hn::IfThenElse(crosses, hn::Neg(hn::Mul(origin, inverse)),
+                            hn::Set(d, std::numeric_limits<float>::infinity()));
+    step = hn::IfThenElse(isForward, hn::Set(d, 1.0f), hn::Set(d, -1.0f));
+    across = hn::Set(i, entries), last = hn::Set(i, count - 1);
+    const auto isUp = hn::RebindMask(i, isForward);
+    forward = hn::IfThenElseZero(isUp, hn::Set(i, 1));
+    stride = hn::IfThenElse(isUp, across, hn::Neg(across));
+  }
+
+  // Where the ray leaves the table.
+  HWY_INLINE Floats leaves() const {
+    return meets(hn::ConvertTo(Lanes(), hn::Mul(forward, hn::Add(last, hn::Set(IntLanes(), 1)))));
+  }
+};
+
+// Of `count` rays, at most as many as a vector has lanes, from s0 on. Those whose bricks promise an optical
+// depth of `opaque` end there.
+inline void findBricks(const MarchScene& scene, const MarchRay* rays, int count, float s0, float opaque,
+                       BrickRows& rows) {
+  const Lanes d;
+  const IntLanes i;
+  AxisWalk axes[3];
+  alignas(64) float lengths[kLanes];
+  {
+    alignas(64) float origins[3][kLanes], directions[3][kLanes];
+    for (int lane = 0; lane != kLanes; ++lane) {
+      const MarchRay& ray = rays[std::min(lane, count - 1)];
+      for (int axis = 0; axis != 3; ++axis) {
+        origins[axis][lane] = ray.density.origin[axis];
+        directions[axis][lane] = ray.density.direction[axis];
+      }
+      lengths[lane] = ray.length;
+    }
+    int entries = 1;
+    for (int axis = 0; axis != 3; ++axis) {
+      axes[axis].set(origins[axis], directions[axis], scene.density.count[axis], entries);
+      entries *= scene.density.count[axis];
+    }
+  }
+  Floats end = hn::Load(d, lengths), s = hn::Set(d, s0), depth = hn::Zero(d);
+  Ints entry = hn::Zero(i);
+  for (AxisWalk& axis : axes) {
+    end = hn::Min(end, axis.leaves());
+    const Ints brick = axis.brickAt(s);
+    axis.plane = hn::ConvertTo(d, hn::Add(brick, axis.forward));
+    axis.exit = axis.meets(axis.plane);
+    entry = hn::Add(entry, hn::Mul(brick, axis.across));
+  }
+  const Floats extinction = hn::Set(d, scene.extinction), enough = hn::Set(d, opaque);
+  auto goesOn = hn::FirstN(d, std::size_t(count));
+  int row = 0;
+  for (; row != BrickRows::kMost && !hn::AllFalse(d, goesOn); ++row) {
+    alignas(64) std::int32_t entries[kLanes], aways[kLanes], radii[kLanes];
+    hn::Store(entry, i, entries);
+    for (int lane = 0; lane != kLanes; ++lane) {
+      const std::int32_t at = inMemory(entries)[lane];
+      const Interval range = scene.ranges[scene.density.table[at]];
+      rows.least[row][lane] = range.min, rows.most[row][lane] = range.max;
+      radii[lane] = aways[lane] = scene.emptiness[at];
+      if (scene.uniformity) radii[lane] |= scene.uniformity[at];
+    }
+    const Ints radius = hn::Sub(hn::Load(i, radii), hn::Set(i, 1));
+    const auto isLeap = hn::RebindMask(d, hn::Gt(radius, hn::Zero(i)));
+    const bool someLeap = !hn::AllFalse(d, hn::And(isLeap, goesOn));
+    Floats ahead[3];
+    for (int axis = 0; axis != 3; ++axis) ahead[axis] = axes[axis].exit;
+    const Floats reach = hn::ConvertTo(d, radius);
+    if (someLeap)
+      for (int axis = 0; axis != 3; ++axis)
+        ahead[axis] = hn::IfThenElse(
+            isLeap, axes[axis].meets(hn::MulAdd(axes[axis].step, reach, axes[axis].plane)), ahead[axis]);
+    const Floats nearest = hn::Min(hn::Min(ahead[0], ahead[1]), ahead[2]), out = hn::Max(nearest, s);
+    const auto isMet = hn::And(goesOn, hn::RebindMask(d, hn::Eq(hn::Load(i, aways), hn::Zero(i))));
+    const Floats stop = hn::IfThenElse(isMet, hn::Min(out, end), s);
+    hn::Store(s, d, rows.begin[row]);
+    hn::Store(stop, d, rows.end[row]);
+    const Floats thinnest = hn::Mul(extinction, hn::Max(hn::Load(d, rows.least[row]), hn::Zero(d)));
+    depth = hn::MulAdd(thinnest, hn::Sub(stop, s), depth);
+    goesOn = hn::And(goesOn, hn::And(hn::Lt(out, end), hn::Lt(depth, enough)));
+    s = out;
+    Ints passed = hn::Zero(i), leapt = hn::Zero(i);
+    for (int n = 0; n != 3; ++n) {
+      AxisWalk& axis = axes[n];
+      const auto crossed = hn::Le(ahead[n], nearest);
+      passed = hn::Add(passed, hn::IfThenElseZero(hn::RebindMask(i, crossed), axis.stride));
+      Floats plane = hn::Add(axis.plane, hn::IfThenElseZero(crossed, axis.step));
+      if (someLeap) {
+        const Ints brick = hn::Sub(hn::ConvertTo(i, axis.plane), axis.forward), low = hn::Sub(brick, radius),
+                   high = hn::Add(brick, radius);
+        const auto isUp = hn::Gt(axis.forward, hn::Zero(i));
+        const Ints beyond = hn::IfThenElse(isUp, hn::Add(high, hn::Set(i, 1)), hn::Sub(low, hn::Set(i, 1))),
+                   beside = hn::Min(hn::Max(axis.brickAt(s), low), high),
+                   next = hn::IfThenElse(hn::RebindMask(i, crossed), beyond, beside);
+        leapt = hn::Add(leapt, hn::Mul(next, axis.across));
+        plane = hn::IfThenElse(isLeap, hn::ConvertTo(d, hn::Add(next, axis.forward)), plane);
+      }
+      axis.plane = plane;
+      axis.exit = axis.meets(plane);
+    }
+    Ints next = hn::Add(entry, passed);
+    if (someLeap) next = hn::IfThenElse(hn::RebindMask(i, isLeap), leapt, next);
+    // Behind the table there are no entries.
+    entry = hn::IfThenElse(hn::RebindMask(i, goesOn), next, entry);
+  }
+  rows.count = row;
+  hn::Store(hn::IfThenElse(goesOn, s, hn::Set(d, std::numeric_limits<float>::infinity())), d, rows.rest);
+}
+
+// Calls visit(s0, s1, range) for every brick with density that the ray of a lane passes, until it returns
+// false.
+template <class Visit>
+HWY_INLINE void forEachBrick(const MarchScene& scene, const MarchRay& ray, float opaque,
+                             const BrickRows& first, int lane, Visit&& visit) {
+  BrickRows own;
+  for (const BrickRows* rows = &first;; rows = &own, lane = 0) {
+    for (int row = 0; row != rows->count; ++row) {
+      const Interval range{rows->least[row][lane], rows->most[row][lane]};
+      if (!visit(rows->begin[row][lane], rows->end[row][lane], range)) return;
+    }
+    const float rest = rows->rest[lane];
+    if (!(rest < ray.length)) return;
+    findBricks(scene, &ray, 1, rest, opaque, own);
+  }
+}
+
+}  // namespace nephele::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
