@@ -327,7 +327,7 @@ std::vector<Vec3d> explodedOffsets(const Pieces& pieces, double explode) {
 std::vector<std::string> writePieces(const Pieces& pieces, const PieceFilesOptions& options,
                                      const Progress& progress) {
   require(!pieces.pieces.empty(), "there are no pieces to write");
-  if (MemoryFile::put(options.folder, std::make_shared<const Pieces>(pieces))) return {};
+  if (MemoryFile::put(options.folder, [&] { return std::make_shared<const Pieces>(pieces); })) return {};
   return PieceWriter(pieces, options).write(progress);
 }
 

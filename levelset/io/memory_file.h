@@ -36,11 +36,11 @@ class MemoryFile {
     if (!content) refuse(path);
     return content;
   }
-  /// Puts `content` there, if the path is one of these, and says whether it is.
-  template <class T>
-  static bool put(const std::string& path, const T& content) {
+  /// Puts what make() returns there, if the path is one of these, and says whether it is.
+  template <class Make>
+  static bool put(const std::string& path, Make&& make) {
     MemoryFile* file = find(path);
-    if (file) file->content_ = content;
+    if (file) file->content_ = make();
     return file != nullptr;
   }
 

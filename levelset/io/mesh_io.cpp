@@ -248,7 +248,7 @@ void writeMesh(const std::string& path, const Mesh& mesh) {
           fmt::format("cannot write {}: unknown mesh format '{}'; .obj, .ply and .stl can be written", path,
                       extension));
 
-  if (MemoryFile::put(path, std::make_shared<const Mesh>(mesh))) return;
+  if (MemoryFile::put(path, [&] { return std::make_shared<const Mesh>(mesh); })) return;
   OutputFile output(path);
   OutputStream stream(output);
   namingFile(path, [&] { write(stream.file(), mesh); });

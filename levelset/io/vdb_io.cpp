@@ -173,12 +173,12 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
     requireReadableTexts(path, *copy);
     labelled.push_back(copy);
   }
-  if (MemoryFile::find(path)) {
-    std::vector<VdbGrid> kept;
-    for (const auto& grid : labelled) kept.push_back(detail::wrapGrid(grid));
-    MemoryFile::put(path, kept);
-    return;
-  }
+  const auto kept = [&] {
+    std::vector<VdbGrid> all;
+    for (const auto& grid : labelled) all.push_back(detail::wrapGrid(grid));
+    return all;
+  };
+  if (MemoryFile::put(path, kept)) return;
   OutputFile output(path);
   try {
     openvdb::io::File file(output.temporaryPath());

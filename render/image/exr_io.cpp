@@ -22,6 +22,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
@@ -162,7 +163,7 @@ std::optional<ImageCamera> readImageCamera(const std::string& path) {
 
 void writeExr(const std::string& path, const Image& image, const ImageCamera& camera,
               const std::map<std::string, std::string>& metadata) {
-  if (MemoryFile::put(path, ExrContent{image, camera, metadata})) return;
+  if (MemoryFile::put(path, [&] { return ExrContent{image, camera, metadata}; })) return;
   OutputFile output(path);
   writeExr(output, image, camera, metadata);
   output.commit();
@@ -178,7 +179,7 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
   });
 
   Imf::FrameBuffer frame;
-  std::vector<std::vector<half>> halves(image.channels.size());
+  std::vector<detail::UnsetVector<half>> halves(image.channels.size());
   parallelFor(halves.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c != end; ++c) {
       const Image::Channel& channel = image.channels[c];

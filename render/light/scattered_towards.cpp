@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/light/detail/cell_rows.h"
 #include "nephele/render/light/detail/harmonics.h"
@@ -39,6 +40,7 @@ struct ScatteredLight::Sender {
 
 // Whether the same is between its nodes and an eye as for another.
 bool ScatteredLight::Sender::isSeenAs(const ScatteredLight& other) const {
+  if (&light == &other) return true;
   return light.size_ == other.size_ && light.share_ == other.share_ &&
          light.depthPerDensity_ == other.depthPerDensity_ && light.density_ == other.density_;
 }
@@ -79,7 +81,10 @@ void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights,
     return far > 0 && std::isfinite(far) ? way * (1 / far) : Vec3f{0, 0, 1};
   };
   // What L is made of, and without the beam.
-  std::vector<detail::Met> met(cells);
+  detail::UnsetVector<detail::Met> met(cells);
+  parallelFor(cells, 1 << 14, [&](std::size_t begin, std::size_t end) {
+    std::fill(met.begin() + std::ptrdiff_t(begin), met.begin() + std::ptrdiff_t(end), detail::Met{});
+  });
   std::vector<std::vector<float>> own;
   for (std::size_t k = 0; k != lights.size(); ++k)
     own.push_back(Sender{*lights[k]}.sources(

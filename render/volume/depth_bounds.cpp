@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "nephele/modeling/base/parallel.h"
 
 namespace nephele {
 
@@ -34,6 +37,28 @@ std::vector<Vec3i> cubesOf(const RenderVolume& volume, int size) {
   return cubes;
 }
 
+// The bounds of a cube in the picture, and its depths.
+struct Seen {
+  static constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  Vec3d low{kInfinite, kInfinite, kInfinite}, high{-kInfinite, -kInfinite, -kInfinite};
+
+  Seen() = default;
+  Seen(const BrickGrid& grid, const Camera& camera, const Vec3i& cube, int size) {
+    const Vec3f first = Vec3f(cube * BrickGrid::kBrick) - Vec3f{kMargin, kMargin, kMargin};
+    const float side = float(size * BrickGrid::kBrick) + 2 * kMargin;
+    for (int corner = 0; corner != 8; ++corner) {
+      const Vec3d at = camera.project(Vec3d(grid.indexToWorld()(
+          first + Vec3f{corner & 1 ? side : 0, corner & 2 ? side : 0, corner & 4 ? side : 0})));
+      for (int axis = 0; axis != 3; ++axis) {
+        low[axis] = std::min(low[axis], at[axis]);
+        high[axis] = std::max(high[axis], at[axis]);
+      }
+    }
+  }
+
+  bool isInFront() const { return low.z > 0 && low.x <= high.x && low.y <= high.y; }
+};
+
 }  // namespace
 
 DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
@@ -45,20 +70,12 @@ DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
   std::vector<Vec3i> cubes = volume.occupiedBricks();
   while (cubes.size() > kMostBoxes) cubes = cubesOf(volume, size *= 2);
 
-  for (const Vec3i& cube : cubes) {
-    constexpr double infinite = std::numeric_limits<double>::infinity();
-    Vec3d low{infinite, infinite, infinite}, high = -low;
-    const Vec3f first = Vec3f(cube * BrickGrid::kBrick) - Vec3f{kMargin, kMargin, kMargin};
-    const float side = float(size * BrickGrid::kBrick) + 2 * kMargin;
-    for (int corner = 0; corner != 8; ++corner) {
-      const Vec3d seen = camera.project(Vec3d(grid.indexToWorld()(
-          first + Vec3f{corner & 1 ? side : 0, corner & 2 ? side : 0, corner & 4 ? side : 0})));
-      for (int axis = 0; axis != 3; ++axis) {
-        low[axis] = std::min(low[axis], seen[axis]);
-        high[axis] = std::max(high[axis], seen[axis]);
-      }
-    }
-    if (!(low.z > 0 && low.x <= high.x && low.y <= high.y)) {
+  std::vector<Seen> seen(cubes.size());
+  parallelFor(cubes.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) seen[i] = Seen(grid, camera, cubes[i], size);
+  });
+  for (const Seen& cube : seen) {
+    if (!cube.isInFront()) {
       cells_.assign(cells_.size(), {0, std::numeric_limits<float>::infinity()});
       return;
     }
@@ -66,12 +83,12 @@ DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
     const auto cellOf = [](double at, int from, int count) {
       return int(std::clamp(std::floor((at - from) / kCell), -1.0, double(count)));
     };
-    const int x0 = std::max(cellOf(low.x - kSpread, window_.x0, across_), 0),
-              y0 = std::max(cellOf(low.y - kSpread, window_.y0, down), 0),
-              x1 = std::min(cellOf(high.x + kSpread, window_.x0, across_), across_ - 1),
-              y1 = std::min(cellOf(high.y + kSpread, window_.y0, down), down - 1);
+    const int x0 = std::max(cellOf(cube.low.x - kSpread, window_.x0, across_), 0),
+              y0 = std::max(cellOf(cube.low.y - kSpread, window_.y0, down), 0),
+              x1 = std::min(cellOf(cube.high.x + kSpread, window_.x0, across_), across_ - 1),
+              y1 = std::min(cellOf(cube.high.y + kSpread, window_.y0, down), down - 1);
     // Depths are rounded to float here and again by whoever asks.
-    const float near = float(low.z * (1 - 1e-5)), far = float(high.z * (1 + 1e-5));
+    const float near = float(cube.low.z * (1 - 1e-5)), far = float(cube.high.z * (1 + 1e-5));
     for (int y = y0; y <= y1; ++y)
       for (int x = x0; x <= x1; ++x) {
         Range& cell = cells_[std::size_t(y) * std::size_t(across_) + std::size_t(x)];

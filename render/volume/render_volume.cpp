@@ -57,23 +57,29 @@ void RenderVolume::measure(const CodedDensity* coded) {
           fmt::format(
               "density: {} distinct bricks are more than the {} that can be marched; use a larger voxel size",
               grid.poolSize(), std::numeric_limits<std::int32_t>::max() / BrickGrid::kVolume));
-  for (const Interval& range : grid.ranges())
-    require(std::isfinite(range.min) && std::isfinite(range.max),
-            "density: contains values that are not finite");
+  Interval all = Interval::of(0);
+  bool isFinite = true;
+  for (const Interval& range : grid.ranges()) {
+    isFinite = isFinite && std::isfinite(range.min) && std::isfinite(range.max);
+    all = all.hull(range);
+  }
+  require(isFinite, "density: contains values that are not finite");
   // Extinctions and optical depths are floats, too.
   constexpr float most = 1e18f;
-  for (const Interval& range : grid.ranges())
-    require(range.max <= most && range.min >= -most,
-            fmt::format("density: expected values up to {:g}, got {:g}", most,
-                        range.max > most ? range.max : range.min));
+  require(all.max <= most && all.min >= -most, fmt::format("density: expected values up to {:g}, got {:g}",
+                                                           most, all.max > most ? all.max : all.min));
   checkColour(colour_.scattering, "colour");
   checkColour(colour_.emission, "emission");
   findOccupied();
   measureColour();
   if (isEmpty()) return;
-  measureEmptiness();
-  measureUniformity();
-  measureBounds(coded);
+  parallelFor(3, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t part = begin; part != end; ++part) {
+      if (part == 0) measureBounds(coded);
+      if (part == 1) measureEmptiness();
+      if (part == 2) measureUniformity();
+    }
+  });
   const Vec3f reach =
       max(max(worldBounds().max, -worldBounds().max), max(worldBounds().min, -worldBounds().min));
   const float farthest = std::max({reach.x, reach.y, reach.z});
@@ -110,9 +116,10 @@ void RenderVolume::checkColour(const VolumeColour::Grids& grids, const char* nam
     require(grid->table() == grids[0]->table() && laidOutAs(*grid, *density_) &&
                 grid->values().size() <= std::size_t(std::numeric_limits<std::int32_t>::max()),
             fmt::format("{}: its bricks must be laid out as the density's", name));
-    for (const Interval& range : grid->ranges())
-      require(std::isfinite(range.min) && std::isfinite(range.max),
-              fmt::format("{}: contains values that are not finite", name));
+    require(std::ranges::all_of(
+                grid->ranges(),
+                [](const Interval& range) { return std::isfinite(range.min) && std::isfinite(range.max); }),
+            fmt::format("{}: contains values that are not finite", name));
   }
 }
 
