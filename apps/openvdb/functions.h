@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "nephele/levelset/cloud/renormalise.h"
 #include "nephele/levelset/io/moved.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -8,18 +10,31 @@
 
 namespace nephele::apps {
 
+/// What program and module must agree on: what is another in one of them was built from other sources.
+struct OpenVdbLayout {
+  char version[48] = "nephele-openvdb " NEPHELE_VERSION;
+  std::size_t functions;
+  std::size_t sizes[8] = {sizeof(VdbGridInfo),  sizeof(VdbGridLabel),        sizeof(BrickGrid),
+                          sizeof(Mesh),         sizeof(detail::BandOptions), sizeof(BakeOptions),
+                          sizeof(DistanceBand), sizeof(VoxelGrid<float>)};
+
+  bool operator==(const OpenVdbLayout& other) const = default;
+};
+
 /// The functions of the libraries that need OpenVDB, which a module has (module.cpp) that the program loads
 /// when one of them is first called (loader.cpp).
 ///
 /// OpenVDB takes longer to load than all else of the program together, as 69 000 symbols are bound at once.
 /// All but the program link the libraries as they are.
 struct OpenVdbFunctions {
+  OpenVdbLayout layout;
   decltype(&nephele::readVdbFile) readVdbFile;
   decltype(&nephele::readVdbHeaders) readVdbHeaders;
   decltype(&nephele::readScalarGrid) readScalarGrid;
   decltype(&nephele::readVectorGrid) readVectorGrid;
   decltype(&nephele::writeVdbFile) writeVdbFile;
   decltype(&nephele::describe) describe;
+  decltype(&nephele::valueRange) valueRange;
   decltype(&nephele::listOf) listOf;
   decltype(&nephele::labelOf) labelOf;
   decltype(&nephele::metadataOf) metadataOf;

@@ -35,7 +35,12 @@ const apps::OpenVdbFunctions& functions() {
     if (!found)
       throw Error(fmt::format("the part of the program that knows VDB cannot be loaded, install it again: {}",
                               dlerror()));
-    return *static_cast<const apps::OpenVdbFunctions*>(found);
+    const auto& exported = *static_cast<const apps::OpenVdbFunctions*>(found);
+    if (exported.layout != apps::OpenVdbLayout{.functions = sizeof(apps::OpenVdbFunctions)})
+      throw Error(
+          fmt::format("the part of the program that knows VDB is another version's, install it again: {}",
+                      pathOfModule()));
+    return exported;
   }();
   return loaded;
 }
@@ -65,6 +70,10 @@ void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
 
 VdbGridInfo describe(const VdbGrid& grid) {
   return functions().describe(grid);
+}
+
+VdbValueRange valueRange(const VdbGrid& grid) {
+  return functions().valueRange(grid);
 }
 
 std::string listOf(const std::vector<VdbGrid>& grids) {

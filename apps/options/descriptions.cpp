@@ -100,9 +100,10 @@ Description volumeDescription(const std::string& path) {
                           {"memory_bytes", g.memoryBytes}});
     Description& last = d["grids"].back();
     if (g.type == "float" || g.type == "double") {
-      last["values"] = {g.valueMin, g.valueMax};
+      const VdbValueRange values = valueRange(grid);
+      last["values"] = {values.min, values.max};
       last["background"] = g.background;
-      if (g.notFinite > 0) last["values_not_finite"] = g.notFinite;
+      if (values.notFinite > 0) last["values_not_finite"] = values.notFinite;
     }
     last["metadata"] = g.metadata;
   }

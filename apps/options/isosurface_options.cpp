@@ -19,9 +19,11 @@ double estimatedBytes(const VdbGridInfo& info) {
   return 50.0 * double(info.activeVoxels) + (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 4;
 }
 
-[[noreturn]] void refuseEmpty(const std::string& volume, const VdbGridInfo& info, double isovalue) {
+[[noreturn]] void refuseEmpty(const std::string& volume, const VdbGrid& file, double isovalue) {
+  const VdbGridInfo info = describe(file);
+  const VdbValueRange values = valueRange(file);
   const double sign = info.gridClass == VdbGridInfo::Class::levelSet ? -1 : 1;
-  const auto [low, high] = std::minmax({sign * double(info.valueMin), sign * double(info.valueMax)});
+  const auto [low, high] = std::minmax({sign * double(values.min), sign * double(values.max)});
   throw Error(fmt::format("{}: no surface at --isovalue {:g}: the values of grid '{}' go from {:g} to {:g}{}",
                           volume, isovalue, info.name, low, high, sign < 0 ? " (positive inside)" : ""));
 }
@@ -47,7 +49,7 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
     run.begin("adaptive mesh");
     return adaptiveMesh(*toBricks(file), level, adaptivity);
   });
-  if (mesh.faceCount() == 0) refuseEmpty(volume, info, level);
+  if (mesh.faceCount() == 0) refuseEmpty(volume, file, level);
   return mesh;
 }
 

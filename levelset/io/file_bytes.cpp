@@ -9,8 +9,7 @@
 
 namespace nephele {
 
-FileBytes::FileBytes(const std::string& path)
-    : file_(path, std::ios::binary | std::ios::ate), window_(std::size_t(kWindow)) {
+FileBytes::FileBytes(const std::string& path) : file_(path, std::ios::binary | std::ios::ate) {
   size_ = file_ ? std::int64_t(file_.tellg()) : -1;
   if (size_ < 0) throw Error("cannot be read");
   emptyAt(0);
@@ -73,14 +72,14 @@ void FileBytes::failShort() const {
 
 void FileBytes::emptyAt(std::int64_t position) {
   start_ = position;
-  setg(window_.data(), window_.data(), window_.data());
+  setg(window_.get(), window_.get(), window_.get());
 }
 
 void FileBytes::fill() {
   emptyAt(position());
   const std::int64_t count = std::min(kWindow, size_ - start_);
-  readAt(start_, window_.data(), count);
-  setg(window_.data(), window_.data(), window_.data() + count);
+  readAt(start_, window_.get(), count);
+  setg(window_.get(), window_.get(), window_.get() + count);
 }
 
 void FileBytes::readAt(std::int64_t position, char* target, std::int64_t count) {

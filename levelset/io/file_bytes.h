@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -53,7 +54,7 @@ class FileBytes final : public std::streambuf {
   void readAt(std::int64_t position, char* target, std::int64_t count);
 
   std::ifstream file_;
-  std::vector<char> window_;
+  std::unique_ptr<char[]> window_ = std::make_unique_for_overwrite<char[]>(kWindow);
   /// Where in the file the window begins.
   std::int64_t start_ = 0;
   std::int64_t size_ = 0;

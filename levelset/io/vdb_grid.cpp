@@ -225,19 +225,25 @@ VdbGridInfo describe(const VdbGrid& handle) {
   } else {
     info.uniform = false;
   }
-  const auto scalar = [&](const auto& typed) {
-    info.background = float(typed.background());
-    const FiniteValues values = finiteValues(typed.tree());
-    info.valueMin = values.min <= values.max ? float(values.min) : 0.0f;
-    info.valueMax = values.min <= values.max ? float(values.max) : 0.0f;
-    info.notFinite = values.notFinite;
-  };
-  if (grid.isType<openvdb::FloatGrid>()) scalar(static_cast<const openvdb::FloatGrid&>(grid));
-  if (grid.isType<openvdb::DoubleGrid>()) scalar(static_cast<const openvdb::DoubleGrid&>(grid));
+  if (grid.isType<openvdb::FloatGrid>())
+    info.background = static_cast<const openvdb::FloatGrid&>(grid).background();
+  if (grid.isType<openvdb::DoubleGrid>())
+    info.background = float(static_cast<const openvdb::DoubleGrid&>(grid).background());
   info.halfFloat = grid.saveFloatAsHalf();
   for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry)
     info.metadata[entry->first] = entry->second->str();
   return info;
+}
+
+VdbValueRange valueRange(const VdbGrid& handle) {
+  const openvdb::GridBase& grid = *handle.impl().grid;
+  FiniteValues values;
+  if (grid.isType<openvdb::FloatGrid>())
+    values = finiteValues(static_cast<const openvdb::FloatGrid&>(grid).tree());
+  if (grid.isType<openvdb::DoubleGrid>())
+    values = finiteValues(static_cast<const openvdb::DoubleGrid&>(grid).tree());
+  if (!(values.min <= values.max)) return {0.0f, 0.0f, values.notFinite};
+  return {float(values.min), float(values.max), values.notFinite};
 }
 
 }  // namespace nephele

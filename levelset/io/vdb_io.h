@@ -40,14 +40,21 @@ struct VdbGridInfo {
   Vec3f voxelSize{};
   bool uniform = true;  ///< Uniform scale and translation only.
   float background = 0.0f;
-  float valueMin = 0.0f, valueMax = 0.0f;  ///< Over finite active values; scalar grids only.
-  std::uint64_t notFinite = 0;  ///< Active voxels that are infinite or not a number; scalar grids only.
   bool halfFloat = false;
   std::uint64_t memoryBytes = 0;
   std::map<std::string, std::string> metadata;
 };
 
 VdbGridInfo describe(const VdbGrid& grid);
+
+/// What the active values of a scalar grid reach.
+struct VdbValueRange {
+  float min = 0.0f, max = 0.0f;  ///< Over finite ones; 0 where there are none.
+  std::uint64_t notFinite = 0;   ///< Voxels that are infinite or not a number.
+};
+
+/// Cost: a look at all values. Nothing of a grid that is not scalar.
+VdbValueRange valueRange(const VdbGrid& grid);
 
 /// Whether a path is that of a volume, by its name: .vdb or .nvdb, in small or capital letters.
 bool isVolumeFile(const std::string& path);

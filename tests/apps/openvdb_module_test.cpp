@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <string>
 
 #include "tests/support/run_program.h"
 
@@ -55,6 +57,22 @@ TEST_F(OpenVdbModule, IsFoundBesideTheProgramAndThroughLinksToIt) {
   EXPECT_EQ(run(there, "levelset '" + mesh_ + "' --resolution 16 -o '" + levels_ + "'").exitCode, 0);
   fs::create_symlink(there, folder_.file("link"));
   EXPECT_EQ(run(folder_.file("link"), "info '" + levels_ + "'").exitCode, 0);
+}
+
+TEST_F(OpenVdbModule, OfAnotherVersionIsRefused) {
+  const std::string stamp = "nephele-openvdb ";
+  std::string module = textOf(kModule.string());
+  const std::size_t version = module.find(stamp);
+  ASSERT_NE(version, std::string::npos);
+  module[version + stamp.size()] = '9';
+  std::ofstream(folder_.file("nephele-openvdb.so"), std::ios::binary) << module;
+  const ProgramResult failed =
+      run(folder_.file("nephele"), "levelset '" + mesh_ + "' --resolution 16 -o '" + levels_ + "'");
+  EXPECT_EQ(failed.exitCode, 1);
+  EXPECT_NE(
+      failed.errors.find("the part of the program that knows VDB is another version's, install it again"),
+      std::string::npos)
+      << failed.errors;
 }
 
 }  // namespace

@@ -50,13 +50,15 @@ void writeAndReadBack(const std::vector<VdbGrid>& grids) {
   expect(back.size() == grids.size(), "a volume that was written has another number of grids");
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const VdbGridInfo before = describe(grids[i]), after = describe(back[i]);
+    const std::uint64_t notFinite = valueRange(grids[i]).notFinite,
+                        notFiniteAfter = valueRange(back[i]).notFinite;
     expect(
         before.type == after.type && before.activeVoxels == after.activeVoxels &&
-            before.notFinite == after.notFinite && before.indexMin.x == after.indexMin.x &&
+            notFinite == notFiniteAfter && before.indexMin.x == after.indexMin.x &&
             before.indexMax.z == after.indexMax.z,
         fmt::format(
             "grid {} of {} is read as another than was written: {} of {} active voxels, {} of {} not finite",
-            i, before.type, after.activeVoxels, before.activeVoxels, after.notFinite, before.notFinite));
+            i, before.type, after.activeVoxels, before.activeVoxels, notFiniteAfter, notFinite));
   }
 }
 

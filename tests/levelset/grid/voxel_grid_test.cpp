@@ -137,9 +137,10 @@ TEST(VoxelGrid, LevelSetsTurnAndAreClampedToTheirBand) {
   VoxelGrid<float> grid("test", 0.25, -0.75f);
   float* samples = grid.add({0, 0, 0});
   for (int i = 0; i < kBrickSamples; ++i) samples[i] = 0.2f * float((i & 7) - 4);
-  const VdbGridInfo info = describe(toVdb(std::move(grid), {"surface", VdbGridInfo::Class::levelSet}));
+  const VdbGrid file = toVdb(std::move(grid), {"surface", VdbGridInfo::Class::levelSet});
+  const VdbGridInfo info = describe(file);
   EXPECT_FLOAT_EQ(info.background, 0.75f);
-  EXPECT_FLOAT_EQ(info.valueMin, -0.6f);
+  EXPECT_FLOAT_EQ(valueRange(file).min, -0.6f);
   // x = 0 is 0.8 outside, beyond the band.
   EXPECT_EQ(info.activeVoxels, 7u * 64u);
   EXPECT_THROW(toVdb(twoBricks(), {"surface", VdbGridInfo::Class::levelSet}), Error);

@@ -68,11 +68,12 @@ TEST_F(NanoVdb, ValuesThatAreNotFiniteAreCounted) {
   values.setValue({3, 0, 0}, -std::numeric_limits<float>::infinity());
   nanovdb::io::writeGrid(folder_.file("a.nvdb"), builder.getHandle<>(0.1, {0.0, 0.0, 0.0}, "density"),
                          Codec::NONE);
-  const VdbGridInfo info = describe(readScalarGrid(folder_.file("a.nvdb")));
-  EXPECT_EQ(info.activeVoxels, 4u);
-  EXPECT_EQ(info.notFinite, 2u);
-  EXPECT_EQ(info.valueMin, 1.0f);
-  EXPECT_EQ(info.valueMax, 3.0f);
+  const VdbGrid grid = readScalarGrid(folder_.file("a.nvdb"));
+  EXPECT_EQ(describe(grid).activeVoxels, 4u);
+  const VdbValueRange range = valueRange(grid);
+  EXPECT_EQ(range.notFinite, 2u);
+  EXPECT_EQ(range.min, 1.0f);
+  EXPECT_EQ(range.max, 3.0f);
 }
 
 TEST_F(NanoVdb, AByteThatChangedInACompressedGridIsNoticed) {

@@ -55,7 +55,7 @@ TEST(VdbIo, LevelSetComesBackBitForBitThroughAFile) {
   EXPECT_GT(before->at({20, 0, 0}), 0.0f);  // In the tube: positive in code.
   writeVdbFile(folder.file("a.vdb"), {toVdb(*before, {"surface", Class::levelSet})}, {});
   const VdbGrid read = readScalarGrid(folder.file("a.vdb"), "surface");
-  EXPECT_LT(describe(read).valueMin, 0.0f);  // In the file: negative inside.
+  EXPECT_LT(valueRange(read).min, 0.0f);  // In the file: negative inside.
   EXPECT_FLOAT_EQ(describe(read).background, 0.15f);
   const auto after = toBricks(read);
   EXPECT_EQ(before->background(), after->background());
@@ -108,16 +108,16 @@ TEST(VdbIo, FogKeepsItsValuesAndItsConstantBricksAreTiles) {
   EXPECT_EQ(info.gridClass, Class::fogVolume);
   EXPECT_EQ(info.background, 0.0f);
   EXPECT_EQ(info.activeVoxels, 1024u);  // 8^3 of the ramp, 8^3 of the tile.
-  EXPECT_FLOAT_EQ(info.valueMax, 7.78f);
+  EXPECT_FLOAT_EQ(valueRange(read).max, 7.78f);
   expectSameSamples(bricks, *toBricks(read));
 }
 
 TEST(VdbIo, FogIsNeverNegativeInFiles) {
   BrickGrid bricks = smallGrid(0.0f, 1.0f);
   bricks.brick(2)[12 * 11 + 1] = -3.0f;
-  const VdbGridInfo info = describe(toVdb(bricks, {"density", Class::fogVolume}));
-  EXPECT_GT(info.valueMin, 0.0f);
-  EXPECT_EQ(info.activeVoxels, 1023u);
+  const VdbGrid fog = toVdb(bricks, {"density", Class::fogVolume});
+  EXPECT_GT(valueRange(fog).min, 0.0f);
+  EXPECT_EQ(describe(fog).activeVoxels, 1023u);
 }
 
 TEST(VdbIo, LevelSetInteriorIsAnInactiveTileOfTheOtherSign) {
@@ -125,9 +125,9 @@ TEST(VdbIo, LevelSetInteriorIsAnInactiveTileOfTheOtherSign) {
   const auto bricks = toBricks(grid);
   EXPECT_FLOAT_EQ(bricks->at({0, 0, 0}), 0.06f);
   EXPECT_FLOAT_EQ(bricks->at({100, 0, 0}), -0.06f);
-  const VdbGridInfo again = describe(toVdb(*bricks, {"surface", Class::levelSet}));
-  EXPECT_EQ(again.activeVoxels, describe(grid).activeVoxels);
-  EXPECT_LT(again.valueMax, 0.06f);
+  const VdbGrid again = toVdb(*bricks, {"surface", Class::levelSet});
+  EXPECT_EQ(describe(again).activeVoxels, describe(grid).activeVoxels);
+  EXPECT_LT(valueRange(again).max, 0.06f);
 }
 
 TEST(VdbIo, TransformsComeBack) {
@@ -336,6 +336,7 @@ TEST(VdbIo, ReadsVolumesMadeElsewhere) {
     NEPHELE_REQUIRE_SHARED_DATA(path);
     const VdbGrid grid = readScalarGrid(path);
     const VdbGridInfo info = describe(grid);
+    const VdbValueRange values = valueRange(grid);
     EXPECT_EQ(info.name, k.grid);
     EXPECT_EQ(info.type, k.type);
     EXPECT_EQ(info.gridClass, k.gridClass);
@@ -344,8 +345,8 @@ TEST(VdbIo, ReadsVolumesMadeElsewhere) {
     EXPECT_NEAR(info.voxelSize.x, k.voxel, 1e-4f * k.voxel + 5e-6f);
     const bool rangeIsKnown = std::string(k.file) != "teapot_cloud.nvdb";
     if (rangeIsKnown) {
-      EXPECT_NEAR(info.valueMin, k.low, 1e-5f);
-      EXPECT_NEAR(info.valueMax, k.high, 1e-4f);
+      EXPECT_NEAR(values.min, k.low, 1e-5f);
+      EXPECT_NEAR(values.max, k.high, 1e-4f);
     }
     // Bricks hold the same extremes: the sign turned for level sets.
     const auto bricks = toBricks(grid);
@@ -353,7 +354,7 @@ TEST(VdbIo, ReadsVolumesMadeElsewhere) {
     EXPECT_EQ(bricks->background(), sign * info.background);
     Interval range = Interval::of(bricks->background());
     for (const Interval& r : bricks->ranges()) range = range.hull(r);
-    EXPECT_TRUE(range.contains(sign * info.valueMin) && range.contains(sign * info.valueMax));
+    EXPECT_TRUE(range.contains(sign * values.min) && range.contains(sign * values.max));
   }
 }
 

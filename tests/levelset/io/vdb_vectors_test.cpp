@@ -45,8 +45,8 @@ TEST(VdbVectors, KeepTiles) {
   // (0, -15, 0) in all of 100^3 voxels.
   const auto parts = readVectorGrid(path, "vel");
   EXPECT_EQ(describe(parts[1]).activeVoxels, 1000000u);
-  EXPECT_EQ(describe(parts[1]).valueMin, -15.0f);
-  EXPECT_EQ(describe(parts[1]).valueMax, -15.0f);
+  EXPECT_EQ(valueRange(parts[1]).min, -15.0f);
+  EXPECT_EQ(valueRange(parts[1]).max, -15.0f);
   EXPECT_LT(describe(parts[1]).memoryBytes, 8u << 20);
 }
 
