@@ -33,25 +33,30 @@ struct BrickRows {
 };
 
 // The rays' walk along one axis, see walkBricks.
+template <class D>
 struct AxisWalk {
-  Floats origin, direction, perPlane, zeroth, step, plane, exit;
+  using Numbers = hn::Vec<D>;
+  using Whole = hn::RebindToSigned<D>;
+  using Integers = hn::Vec<Whole>;
+
+  Numbers origin, direction, perPlane, zeroth, step, plane, exit;
   // Of the table's entries, towards larger bricks and the way that the ray goes.
-  Ints across, stride, forward, last;
+  Integers across, stride, forward, last;
 
-  HWY_INLINE Floats meets(Floats at) const { return hn::MulAdd(at, perPlane, zeroth); }
+  HWY_INLINE Numbers meets(Numbers at) const { return hn::MulAdd(at, perPlane, zeroth); }
 
-  HWY_INLINE Ints brickAt(Floats s) const {
-    const Floats at = hn::Mul(hn::MulAdd(s, direction, origin), hn::Set(Lanes(), 0.125f));
-    return hn::Min(hn::Max(hn::ConvertTo(IntLanes(), at), hn::Zero(IntLanes())), last);
+  HWY_INLINE Integers brickAt(Numbers s) const {
+    const Numbers at = hn::Mul(hn::MulAdd(s, direction, origin), hn::Set(D(), 0.125f));
+    return hn::Min(hn::Max(hn::ConvertTo(Whole(), at), hn::Zero(Whole())), last);
   }
 
   HWY_INLINE void set(const float* origins, const float* directions, int count, int entries) {
-    const Lanes d;
-    const IntLanes i;
+    const D d;
+    const Whole i;
     origin = hn::Load(d, origins), direction = hn::Load(d, directions);
     const auto isForward = hn::Gt(direction, hn::Zero(d)),
                crosses = hn::Gt(hn::Abs(direction), hn::Set(d, 1e-30f));
-    const Floats inverse = hn::Div(hn::Set(d, 1.0f), direction);
+    const Numbers inverse = hn::Div(hn::Set(d, 1.0f), direction);
     perPlane = hn::IfThenElseZero(crosses, hn::Mul(hn::Set(d, 8.0f), inverse));
     zeroth = hn::IfThenElse(crosses, hn::Neg(hn::Mul(origin, inverse)),
                             hn::Set(d, std::numeric_limits<float>::infinity()));
@@ -63,22 +68,24 @@ struct AxisWalk {
   }
 
   // Where the ray leaves the table.
-  HWY_INLINE Floats leaves() const {
-    return meets(hn::ConvertTo(Lanes(), hn::Mul(forward, hn::Add(last, hn::Set(IntLanes(), 1)))));
+  HWY_INLINE Numbers leaves() const {
+    return meets(hn::ConvertTo(D(), hn::Mul(forward, hn::Add(last, hn::Set(Whole(), 1)))));
   }
 };
 
-// Of `count` rays, at most as many as a vector has lanes, from s0 on. Those whose bricks promise an optical
-// depth of `opaque` end there.
-inline void findBricks(const MarchScene& scene, const MarchRay* rays, int count, float s0, float opaque,
-                       BrickRows& rows) {
-  const Lanes d;
-  const IntLanes i;
-  AxisWalk axes[3];
-  alignas(64) float lengths[kLanes];
+// With vectors of no more lanes than are needed.
+template <class D>
+HWY_NOINLINE void findBricksOf(D d, const MarchScene& scene, const MarchRay* rays, int count, float s0,
+                               float opaque, BrickRows& rows) {
+  using Numbers = hn::Vec<D>;
+  const hn::RebindToSigned<D> i;
+  using Integers = hn::Vec<decltype(i)>;
+  constexpr int kRays = int(hn::MaxLanes(D()));
+  AxisWalk<D> axes[3];
+  alignas(64) float lengths[kRays];
   {
-    alignas(64) float origins[3][kLanes], directions[3][kLanes];
-    for (int lane = 0; lane != kLanes; ++lane) {
+    alignas(64) float origins[3][kRays], directions[3][kRays];
+    for (int lane = 0; lane != kRays; ++lane) {
       const MarchRay& ray = rays[std::min(lane, count - 1)];
       for (int axis = 0; axis != 3; ++axis) {
         origins[axis][lane] = ray.density.origin[axis];
@@ -92,73 +99,85 @@ inline void findBricks(const MarchScene& scene, const MarchRay* rays, int count,
       entries *= scene.density.count[axis];
     }
   }
-  Floats end = hn::Load(d, lengths), s = hn::Set(d, s0), depth = hn::Zero(d);
-  Ints entry = hn::Zero(i);
-  for (AxisWalk& axis : axes) {
+  Numbers end = hn::Load(d, lengths), s = hn::Set(d, s0), depth = hn::Zero(d);
+  Integers entry = hn::Zero(i);
+  for (AxisWalk<D>& axis : axes) {
     end = hn::Min(end, axis.leaves());
-    const Ints brick = axis.brickAt(s);
+    const Integers brick = axis.brickAt(s);
     axis.plane = hn::ConvertTo(d, hn::Add(brick, axis.forward));
     axis.exit = axis.meets(axis.plane);
     entry = hn::Add(entry, hn::Mul(brick, axis.across));
   }
-  const Floats extinction = hn::Set(d, scene.extinction), enough = hn::Set(d, opaque);
+  const Numbers extinction = hn::Set(d, scene.extinction), enough = hn::Set(d, opaque);
   auto goesOn = hn::FirstN(d, std::size_t(count));
   int row = 0;
   for (; row != BrickRows::kMost && !hn::AllFalse(d, goesOn); ++row) {
-    alignas(64) std::int32_t entries[kLanes], aways[kLanes], radii[kLanes];
+    alignas(64) std::int32_t entries[kRays], aways[kRays], radii[kRays];
     hn::Store(entry, i, entries);
-    for (int lane = 0; lane != kLanes; ++lane) {
+    for (int lane = 0; lane != kRays; ++lane) {
       const std::int32_t at = inMemory(entries)[lane];
       const Interval range = scene.ranges[scene.density.table[at]];
       rows.least[row][lane] = range.min, rows.most[row][lane] = range.max;
       radii[lane] = aways[lane] = scene.emptiness[at];
       if (scene.uniformity) radii[lane] |= scene.uniformity[at];
     }
-    const Ints radius = hn::Sub(hn::Load(i, radii), hn::Set(i, 1));
+    const Integers radius = hn::Sub(hn::Load(i, radii), hn::Set(i, 1));
     const auto isLeap = hn::RebindMask(d, hn::Gt(radius, hn::Zero(i)));
     const bool someLeap = !hn::AllFalse(d, hn::And(isLeap, goesOn));
-    Floats ahead[3];
+    Numbers ahead[3];
     for (int axis = 0; axis != 3; ++axis) ahead[axis] = axes[axis].exit;
-    const Floats reach = hn::ConvertTo(d, radius);
+    const Numbers reach = hn::ConvertTo(d, radius);
     if (someLeap)
       for (int axis = 0; axis != 3; ++axis)
         ahead[axis] = hn::IfThenElse(
             isLeap, axes[axis].meets(hn::MulAdd(axes[axis].step, reach, axes[axis].plane)), ahead[axis]);
-    const Floats nearest = hn::Min(hn::Min(ahead[0], ahead[1]), ahead[2]), out = hn::Max(nearest, s);
+    const Numbers nearest = hn::Min(hn::Min(ahead[0], ahead[1]), ahead[2]), out = hn::Max(nearest, s);
     const auto isMet = hn::And(goesOn, hn::RebindMask(d, hn::Eq(hn::Load(i, aways), hn::Zero(i))));
-    const Floats stop = hn::IfThenElse(isMet, hn::Min(out, end), s);
+    const Numbers stop = hn::IfThenElse(isMet, hn::Min(out, end), s);
     hn::Store(s, d, rows.begin[row]);
     hn::Store(stop, d, rows.end[row]);
-    const Floats thinnest = hn::Mul(extinction, hn::Max(hn::Load(d, rows.least[row]), hn::Zero(d)));
+    const Numbers thinnest = hn::Mul(extinction, hn::Max(hn::Load(d, rows.least[row]), hn::Zero(d)));
     depth = hn::MulAdd(thinnest, hn::Sub(stop, s), depth);
     goesOn = hn::And(goesOn, hn::And(hn::Lt(out, end), hn::Lt(depth, enough)));
     s = out;
-    Ints passed = hn::Zero(i), leapt = hn::Zero(i);
+    Integers passed = hn::Zero(i), leapt = hn::Zero(i);
     for (int n = 0; n != 3; ++n) {
-      AxisWalk& axis = axes[n];
+      AxisWalk<D>& axis = axes[n];
       const auto crossed = hn::Le(ahead[n], nearest);
       passed = hn::Add(passed, hn::IfThenElseZero(hn::RebindMask(i, crossed), axis.stride));
-      Floats plane = hn::Add(axis.plane, hn::IfThenElseZero(crossed, axis.step));
+      Numbers plane = hn::Add(axis.plane, hn::IfThenElseZero(crossed, axis.step));
       if (someLeap) {
-        const Ints brick = hn::Sub(hn::ConvertTo(i, axis.plane), axis.forward), low = hn::Sub(brick, radius),
-                   high = hn::Add(brick, radius);
+        const Integers brick = hn::Sub(hn::ConvertTo(i, axis.plane), axis.forward),
+                       low = hn::Sub(brick, radius), high = hn::Add(brick, radius);
         const auto isUp = hn::Gt(axis.forward, hn::Zero(i));
-        const Ints beyond = hn::IfThenElse(isUp, hn::Add(high, hn::Set(i, 1)), hn::Sub(low, hn::Set(i, 1))),
-                   beside = hn::Min(hn::Max(axis.brickAt(s), low), high),
-                   next = hn::IfThenElse(hn::RebindMask(i, crossed), beyond, beside);
+        const Integers beyond =
+                           hn::IfThenElse(isUp, hn::Add(high, hn::Set(i, 1)), hn::Sub(low, hn::Set(i, 1))),
+                       beside = hn::Min(hn::Max(axis.brickAt(s), low), high),
+                       next = hn::IfThenElse(hn::RebindMask(i, crossed), beyond, beside);
         leapt = hn::Add(leapt, hn::Mul(next, axis.across));
         plane = hn::IfThenElse(isLeap, hn::ConvertTo(d, hn::Add(next, axis.forward)), plane);
       }
       axis.plane = plane;
       axis.exit = axis.meets(plane);
     }
-    Ints next = hn::Add(entry, passed);
+    Integers next = hn::Add(entry, passed);
     if (someLeap) next = hn::IfThenElse(hn::RebindMask(i, isLeap), leapt, next);
     // Behind the table there are no entries.
     entry = hn::IfThenElse(hn::RebindMask(i, goesOn), next, entry);
   }
   rows.count = row;
   hn::Store(hn::IfThenElse(goesOn, s, hn::Set(d, std::numeric_limits<float>::infinity())), d, rows.rest);
+}
+
+// Of `count` rays, at most as many as a vector has lanes, from s0 on. Those whose bricks promise an optical
+// depth of `opaque` end there.
+inline void findBricks(const MarchScene& scene, const MarchRay* rays, int count, float s0, float opaque,
+                       BrickRows& rows) {
+  using Few = hn::CappedTag<float, 4>;
+  if (count > int(hn::MaxLanes(Few())))
+    findBricksOf(Lanes(), scene, rays, count, s0, opaque, rows);
+  else
+    findBricksOf(Few(), scene, rays, count, s0, opaque, rows);
 }
 
 // Calls visit(s0, s1, range) for every brick with density that the ray of a lane passes, until it returns

@@ -19,7 +19,7 @@ float opacityOf(float opticalDepth) {
 
 // Rays that are marched through a field together: enough for long blocks of points, few enough for the cache.
 constexpr int kFieldRays = 64;
-// And through a grid: as many as a vector holds.
+// And through a grid: as many as the longest vectors hold.
 constexpr int kGridRays = 16;
 
 // Voxels that a step may pass over where those of other rays of the pixel lie within it: the error of the
