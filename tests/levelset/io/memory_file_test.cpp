@@ -40,6 +40,16 @@ TEST(MemoryFile, KeepsWhatIsWrittenAndMakesNoFile) {
   EXPECT_THROW(readScalarGrid(volume.path(), "v"), Error);
 }
 
+TEST(MemoryFile, AsksForContentsOnlyWhereTheyArePut) {
+  int asked = 0;
+  const auto make = [&] { return ++asked; };
+  EXPECT_FALSE(MemoryFile::put("ball.ply", make));
+  EXPECT_EQ(asked, 0);
+  const MemoryFile file("ball", ".ply");
+  EXPECT_TRUE(MemoryFile::put(file.path(), make));
+  EXPECT_EQ(*MemoryFile::contentOf<int>(file.path()), 1);
+}
+
 TEST(MemoryFile, HasAPathOfItsOwnAsLongAsItLives) {
   std::string path;
   {
