@@ -4,10 +4,11 @@
 // T_before - T_after with T = exp(-optical depth so far), so that the weights of a ray add up to its opacity
 // exactly, whatever the steps are.
 //
-// Steps are gathered into blocks of 32 that run across bricks. Densities of a block are looked up as vectors:
-// brick table, then the eight corners. So is the light, in every sun's column densities and in the scattered
-// light, of those steps alone that add to the picture, once they fill a vector. Densities and columns are
-// CodedBricks, half as many bytes to wait for.
+// As many rays as a vector has lanes find the bricks on their way together; then one after the other is
+// marched. Steps are gathered into blocks of 32 that run across bricks. Densities of a block are looked up as
+// vectors: brick table, then the eight corners. So is the light, in every sun's column densities and in the
+// scattered light, of those steps alone that add to the picture, once they fill a vector. Densities and
+// columns are CodedBricks, half as many bytes to wait for.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE

@@ -30,8 +30,7 @@ using AxesInts [[gnu::vector_size(16)]] = std::int32_t;
 ///
 /// A DDA over bricks, all axes at once and without branches that could not be foreseen; where a brick is
 /// `emptiness` bricks away from any density, or `uniformity` bricks away from any other density, the box of
-/// that radius is left in one step. Inlined, so that it is compiled for the instructions of the kernel around
-/// it.
+/// that radius is left in one step. The kernels of the march walk vectors of rays in the same way.
 template <class Visit>
 [[gnu::always_inline]] inline void walkBricks(const MarchScene& scene, const LatticeRay& ray, float length,
                                               Visit&& visit) {
