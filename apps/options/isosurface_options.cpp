@@ -19,9 +19,8 @@ double estimatedBytes(const VdbGridInfo& info) {
   return 50.0 * double(info.activeVoxels) + (size.x / 8 + 2) * (size.y / 8 + 2) * (size.z / 8 + 2) * 4;
 }
 
-[[noreturn]] void refuseEmpty(const std::string& volume, const VdbGrid& file, double isovalue) {
-  const VdbGridInfo info = describe(file);
-  const VdbValueRange values = valueRange(file);
+[[noreturn]] void refuseEmpty(const std::string& volume, const VdbGridInfo& info, const VdbValueRange& values,
+                              double isovalue) {
   const double sign = info.gridClass == VdbGridInfo::Class::levelSet ? -1 : 1;
   const auto [low, high] = std::minmax({sign * double(values.min), sign * double(values.max)});
   throw Error(fmt::format("{}: no surface at --isovalue {:g}: the values of grid '{}' go from {:g} to {:g}{}",
@@ -49,7 +48,7 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
     run.begin("adaptive mesh");
     return adaptiveMesh(*toBricks(file), level, adaptivity);
   });
-  if (mesh.faceCount() == 0) refuseEmpty(volume, file, level);
+  if (mesh.faceCount() == 0) refuseEmpty(volume, info, valueRange(file), level);
   return mesh;
 }
 

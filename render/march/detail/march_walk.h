@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "nephele/render/march/detail/march_axis.h"
 #include "nephele/render/march/detail/march_lanes.h"
 #include "nephele/render/march/detail/march_loads.h"
 #include "nephele/render/march/march_kernels.h"
@@ -32,47 +33,6 @@ struct BrickRows {
   alignas(64) float rest[kLanes];
 };
 
-// The rays' walk along one axis, see walkBricks.
-template <class D>
-struct AxisWalk {
-  using Numbers = hn::Vec<D>;
-  using Whole = hn::RebindToSigned<D>;
-  using Integers = hn::Vec<Whole>;
-
-  Numbers origin, direction, perPlane, zeroth, step, plane, exit;
-  // Of the table's entries, towards larger bricks and the way that the ray goes.
-  Integers across, stride, forward, last;
-
-  HWY_INLINE Numbers meets(Numbers at) const { return hn::MulAdd(at, perPlane, zeroth); }
-
-  HWY_INLINE Integers brickAt(Numbers s) const {
-    const Numbers at = hn::Mul(hn::MulAdd(s, direction, origin), hn::Set(D(), 0.125f));
-    return hn::Min(hn::Max(hn::ConvertTo(Whole(), at), hn::Zero(Whole())), last);
-  }
-
-  HWY_INLINE void set(const float* origins, const float* directions, int count, int entries) {
-    const D d;
-    const Whole i;
-    origin = hn::Load(d, origins), direction = hn::Load(d, directions);
-    const auto isForward = hn::Gt(direction, hn::Zero(d)),
-               crosses = hn::Gt(hn::Abs(direction), hn::Set(d, 1e-30f));
-    const Numbers inverse = hn::Div(hn::Set(d, 1.0f), direction);
-    perPlane = hn::IfThenElseZero(crosses, hn::Mul(hn::Set(d, 8.0f), inverse));
-    zeroth = hn::IfThenElse(crosses, hn::Neg(hn::Mul(origin, inverse)),
-                            hn::Set(d, std::numeric_limits<float>::infinity()));
-    step = hn::IfThenElse(isForward, hn::Set(d, 1.0f), hn::Set(d, -1.0f));
-    across = hn::Set(i, entries), last = hn::Set(i, count - 1);
-    const auto isUp = hn::RebindMask(i, isForward);
-    forward = hn::IfThenElseZero(isUp, hn::Set(i, 1));
-    stride = hn::IfThenElse(isUp, across, hn::Neg(across));
-  }
-
-  // Where the ray leaves the table.
-  HWY_INLINE Numbers leaves() const {
-    return meets(hn::ConvertTo(D(), hn::Mul(forward, hn::Add(last, hn::Set(Whole(), 1)))));
-  }
-};
-
 // With vectors of no more lanes than are needed.
 template <class D>
 HWY_NOINLINE void findBricksOf(D d, const MarchScene& scene, const MarchRay* rays, int count, float s0,
@@ -82,30 +42,16 @@ HWY_NOINLINE void findBricksOf(D d, const MarchScene& scene, const MarchRay* ray
   using Integers = hn::Vec<decltype(i)>;
   constexpr int kRays = int(hn::MaxLanes(D()));
   AxisWalk<D> axes[3];
+  for (int axis = 0, entries = 1; axis != 3; entries *= scene.density.count[axis++])
+    axes[axis].set(rays, count, axis, scene.density.count[axis], entries);
   alignas(64) float lengths[kRays];
-  {
-    alignas(64) float origins[3][kRays], directions[3][kRays];
-    for (int lane = 0; lane != kRays; ++lane) {
-      const MarchRay& ray = rays[std::min(lane, count - 1)];
-      for (int axis = 0; axis != 3; ++axis) {
-        origins[axis][lane] = ray.density.origin[axis];
-        directions[axis][lane] = ray.density.direction[axis];
-      }
-      lengths[lane] = ray.length;
-    }
-    int entries = 1;
-    for (int axis = 0; axis != 3; ++axis) {
-      axes[axis].set(origins[axis], directions[axis], scene.density.count[axis], entries);
-      entries *= scene.density.count[axis];
-    }
-  }
+  for (int lane = 0; lane != kRays; ++lane) lengths[lane] = rays[std::min(lane, count - 1)].length;
   Numbers end = hn::Load(d, lengths), s = hn::Set(d, s0), depth = hn::Zero(d);
   Integers entry = hn::Zero(i);
   for (AxisWalk<D>& axis : axes) {
     end = hn::Min(end, axis.leaves());
     const Integers brick = axis.brickAt(s);
-    axis.plane = hn::ConvertTo(d, hn::Add(brick, axis.forward));
-    axis.exit = axis.meets(axis.plane);
+    axis.stand(axis.planeOf(brick));
     entry = hn::Add(entry, hn::Mul(brick, axis.across));
   }
   const Numbers extinction = hn::Set(d, scene.extinction), enough = hn::Set(d, opaque);
@@ -147,18 +93,11 @@ HWY_NOINLINE void findBricksOf(D d, const MarchScene& scene, const MarchRay* ray
       passed = hn::Add(passed, hn::IfThenElseZero(hn::RebindMask(i, crossed), axis.stride));
       Numbers plane = hn::Add(axis.plane, hn::IfThenElseZero(crossed, axis.step));
       if (someLeap) {
-        const Integers brick = hn::Sub(hn::ConvertTo(i, axis.plane), axis.forward),
-                       low = hn::Sub(brick, radius), high = hn::Add(brick, radius);
-        const auto isUp = hn::Gt(axis.forward, hn::Zero(i));
-        const Integers beyond =
-                           hn::IfThenElse(isUp, hn::Add(high, hn::Set(i, 1)), hn::Sub(low, hn::Set(i, 1))),
-                       beside = hn::Min(hn::Max(axis.brickAt(s), low), high),
-                       next = hn::IfThenElse(hn::RebindMask(i, crossed), beyond, beside);
+        const Integers next = axis.afterLeap(radius, crossed, s);
         leapt = hn::Add(leapt, hn::Mul(next, axis.across));
-        plane = hn::IfThenElse(isLeap, hn::ConvertTo(d, hn::Add(next, axis.forward)), plane);
+        plane = hn::IfThenElse(isLeap, axis.planeOf(next), plane);
       }
-      axis.plane = plane;
-      axis.exit = axis.meets(plane);
+      axis.stand(plane);
     }
     Integers next = hn::Add(entry, passed);
     if (someLeap) next = hn::IfThenElse(hn::RebindMask(i, isLeap), leapt, next);
