@@ -73,7 +73,7 @@ struct LightVolume::Sweep {
   /// World length of a slice along the light, and whether the light is at the upper end of w.
   float step;
   bool fromAbove;
-  int sampleStride[3];
+  int sampleStride[3] = {1, BrickGrid::kWidth, BrickGrid::kWidth* BrickGrid::kWidth};
 
   Sweep(const RenderVolume& volume, const Vec3f& light, float mostDensity)
       : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()), most(mostDensity) {
@@ -86,10 +86,7 @@ struct LightVolume::Sweep {
     slopeV = light[v] / light[w];
     step = 1.0f / std::fabs(light[w]);
     fromAbove = light[w] > 0;
-    const int width = coded ? CodedBricks::kWidth : BrickGrid::kWidth;
-    sampleStride[0] = 1;
-    sampleStride[1] = width;
-    sampleStride[2] = width * width;
+    if (coded) sampleStride[1] = CodedBricks::kRow, sampleStride[2] = CodedBricks::kPlane;
   }
 
   Vec3i bricks(int bu, int bv, int bw) const {
@@ -130,18 +127,24 @@ struct LightVolume::Sweep {
         const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
         float* rows = patch.samples.data() + (v1 - patch.v) * kPitch + (u1 - patch.u);
         const auto copy = [&, countU = u2 - u1, countV = v2 - v1](const auto& sampleAt) {
-          if (u == 0)
-            copyRows(countU, countV, rows, sampleAt);
+          const int from = insideBrick(u1);
+          if (u != 0)
+            copyRows(from, countU, countV, rows,
+                     [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
+          else if (coded)
+            copyRows(from, countU, countV, rows,
+                     [&](int x, int y) { return sampleAt(CodedBricks::offsetAlongX(x), y); });
           else
-            copyRows(countU, countV, rows, [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
+            copyRows(from, countU, countV, rows, sampleAt);
         };
-        const int first = insideBrick(k) * sampleStride[w] + insideBrick(u1) * sampleStride[u] +
-                          insideBrick(v1) * sampleStride[v];
+        const int alongW = w == 0 && coded ? CodedBricks::offsetAlongX(insideBrick(k))
+                                           : insideBrick(k) * sampleStride[w],
+                  first = alongW + insideBrick(v1) * sampleStride[v];
         if (!holds) {
           copy([](int, int) { return 0.0f; });
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
-          const std::uint16_t* from = coded->codes() + entry.first + first;
+          const std::int16_t* from = coded->codes() + entry.first + first;
           copy([&](int x, int y) {
             return (float(from[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
           });
@@ -156,14 +159,14 @@ struct LightVolume::Sweep {
     return true;
   }
 
-  // The samples at(x, y) of a part of a patch, whose rows are mostly whole bricks.
+  // The samples at(x, y) of a part of a patch, x from `from` on, whose rows are mostly whole bricks.
   template <class At>
-  static void copyRows(int countU, int countV, float* rows, const At& at) {
+  static void copyRows(int from, int countU, int countV, float* rows, const At& at) {
     for (int y = 0; y != countV; ++y, rows += kPitch)
       if (countU == BrickGrid::kBrick)
         for (int x = 0; x != BrickGrid::kBrick; ++x) rows[x] = at(x, y);
       else
-        for (int x = 0; x != countU; ++x) rows[x] = at(x, y);
+        for (int x = 0; x != countU; ++x) rows[x] = at(from + x, y);
   }
 
   // What any node of a brick of the lattice adds to its column at least, its first nodes at (u0, v0).
@@ -414,12 +417,13 @@ void LightVolume::columnDensities(std::span<const Vec3f> world, std::span<float>
     else {
       // Codes are interpolated as they are: what they stand for is linear in them.
       const CodedBricks::Entry& entry = coded_.entries()[place];
-      const std::uint16_t* first = coded_.codes() + entry.first + (at.z * kWidth + at.y) * kWidth + at.x;
-      bent =
-          (trilinear(p - Vec3f(cell),
-                     [first](int x, int y, int z) { return float(first[(z * kWidth + y) * kWidth + x]); }) -
-           CodedBricks::kZero) *
-          entry.unit;
+      const std::int16_t* first = coded_.codes() + entry.first + CodedBricks::offsetOf(at);
+      bent = (trilinear(p - Vec3f(cell),
+                        [first](int x, int y, int z) {
+                          return float(first[z * CodedBricks::kPlane + y * CodedBricks::kRow + x]);
+                        }) -
+              CodedBricks::kZero) *
+             entry.unit;
     }
     columns[n] = detail::unbentColumn(bent, bend_);
   }

@@ -22,7 +22,7 @@ namespace nephele::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Codes the nodes of a brick, of which rows begin `row` and planes `plane` apart, and returns their unit.
-float codeBrick(const float* nodes, std::size_t row, std::size_t plane, std::uint16_t* out) {
+float codeBrick(const float* nodes, std::size_t row, std::size_t plane, std::int16_t* out) {
   using Lanes = hn::CappedTag<float, 16>;
   using Bits = hn::RebindToSigned<Lanes>;
   const Lanes d;
@@ -44,19 +44,23 @@ float codeBrick(const float* nodes, std::size_t row, std::size_t plane, std::uin
   }
   const float high = hn::GetLane(hn::MaxOfLanes(d, most)), low = hn::GetLane(hn::MinOfLanes(d, least));
   const float largest = high > 0 ? high : 0.0f, smallest = low < 0 ? -low : 0.0f;
+  constexpr float kBelowZero = CodedBricks::kZero - CodedBricks::kLeast;
   float unit = largest / CodedBricks::kLargest;
-  if (smallest > unit * CodedBricks::kZero) unit = smallest / CodedBricks::kZero;
+  if (smallest > unit * kBelowZero) unit = smallest / kBelowZero;
   if (!(unit > 1e-30f / CodedBricks::kLargest)) unit = 0.0f;
   if (unit > 1e30f / CodedBricks::kLargest) unit = 1e30f / CodedBricks::kLargest;
   const auto inverse = hn::Set(d, unit > 0 ? 1 / unit : 0.0f), zero = hn::Set(d, CodedBricks::kZero);
-  const hn::Rebind<std::uint16_t, Bits> narrow;
-  alignas(64) std::uint16_t codes[kRoom];
+  const hn::Rebind<std::int16_t, Bits> narrow;
+  alignas(64) std::int16_t codes[kRoom];
   for (std::size_t n = 0; n < CodedBricks::kNodes; n += lanes) {
     const auto scaled = hn::Add(hn::Mul(hn::Load(d, packed + n), inverse), zero);
-    const auto code = hn::Min(hn::Max(scaled, hn::Zero(d)), hn::Set(d, 65535.0f));
+    const auto code =
+        hn::Min(hn::Max(scaled, hn::Set(d, CodedBricks::kLeast)), hn::Set(d, CodedBricks::kMost));
     hn::StoreU(hn::DemoteTo(narrow, hn::NearestInt(code)), narrow, codes + n);
   }
-  std::copy_n(codes, CodedBricks::kNodes, out);
+  for (const std::size_t half : {std::size_t(0), std::size_t(CodedBricks::kHalfCells)})
+    for (std::size_t n = 0; n != kWidth * kWidth; ++n, out += CodedBricks::kRow)
+      std::copy_n(codes + n * kWidth + half, CodedBricks::kRow, out);
   return unit;
 }
 
@@ -77,9 +81,9 @@ namespace nephele {
 HWY_EXPORT(codeBrick);
 
 CodedBricks::CodedBricks(std::size_t bricks) : units_(bricks) {
-  const std::size_t count = bricks * kNodes;
+  const std::size_t count = bricks * kCodes;
   require(count <= std::size_t(UINT32_MAX), "march: more bricks than can be addressed");
-  codes_ = std::make_shared_for_overwrite<std::uint16_t[]>(count);
+  codes_ = std::make_shared_for_overwrite<std::int16_t[]>(count + kBehind);
   detail::useHugePages(codes_.get(), codes_.get() + count);
 }
 
@@ -93,7 +97,7 @@ void CodedBricks::setAll(const std::size_t (&strides)[2], const NodesOf& nodesOf
     parallelFor(last - first, 16, [&](std::size_t begin, std::size_t end) {
       for (std::size_t pool = first + begin; pool != first + end; ++pool)
         units_[pool] = HWY_DYNAMIC_DISPATCH(codeBrick)(nodesOf(pool), strides[0], strides[1],
-                                                       codes_.get() + pool * kNodes);
+                                                       codes_.get() + pool * kCodes);
     });
     done(first, last);
   }
@@ -124,7 +128,7 @@ CodedBricks CodedBricks::inPlaceOf(BrickGrid& grid) {
 CodedBricks::CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::int32_t> table)
     : CodedBricks(nodes.size() / kNodes) {
   setAll(
-      {kWidth, kPlane}, [&](std::size_t pool) { return nodes.data() + pool * kNodes; },
+      {kWidth, kWidth * kWidth}, [&](std::size_t pool) { return nodes.data() + pool * kNodes; },
       [&](std::size_t begin, std::size_t end) {
         detail::releasePages(nodes.data() + begin * kNodes, nodes.data() + end * kNodes);
       });
@@ -133,14 +137,14 @@ CodedBricks::CodedBricks(detail::UnsetVector<float> nodes, std::span<const std::
 
 void CodedBricks::set(std::int32_t pool, const float* nodes, int row) {
   units_[std::size_t(pool)] = HWY_DYNAMIC_DISPATCH(codeBrick)(nodes, std::size_t(row), std::size_t(row * row),
-                                                              codes_.get() + std::size_t(pool) * kNodes);
+                                                              codes_.get() + std::size_t(pool) * kCodes);
 }
 
 void CodedBricks::setTable(std::span<const std::int32_t> table) {
   entries_.clear();
   entries_.reserve(table.size());
   for (const std::int32_t pool : table)
-    entries_.push_back({std::uint32_t(std::size_t(pool) * kNodes), units_[std::size_t(pool)]});
+    entries_.push_back({std::uint32_t(std::size_t(pool) * kCodes), units_[std::size_t(pool)]});
 }
 
 }  // namespace nephele

@@ -13,8 +13,8 @@ namespace nephele {
 
 class BrickGrid;
 
-/// Bricks of 9^3 nodes in 16 bits each, as the march reads them: half the bytes of a float, and two corners
-/// of a cell in a load of 32 bits.
+/// Bricks of 9^3 nodes in 16 bits each, as the march reads them: about half the bytes of floats, and four
+/// corners of a cell in a load of 16 bytes.
 ///
 /// A node is (code - kZero) * unit with a unit for every brick, so that it errs by at most half a unit: 1 /
 /// 114686 of the brick's largest value, and by less than a unit of the last place in bricks of one value. 0
@@ -23,12 +23,25 @@ class BrickGrid;
 class CodedBricks {
  public:
   static constexpr int kWidth = 9;
-  static constexpr int kPlane = kWidth * kWidth;
-  static constexpr int kNodes = kPlane * kWidth;
-  static constexpr float kZero = 8192.0f, kLargest = 65535.0f - kZero;
+  static constexpr int kNodes = kWidth * kWidth * kWidth;
+  /// Codes come in two halves along x, of four cells each, so that rows are short enough for a load to reach
+  /// the next one; the nodes between the halves stand in both. Along a row, from row to row and from plane to
+  /// plane it is 1, kRow and kPlane codes.
+  static constexpr int kHalfCells = 4, kRow = kHalfCells + 1, kPlane = kWidth * kRow, kHalf = kWidth * kPlane,
+                       kCodes = 2 * kHalf;
+  /// How many codes a load of 16 bytes at a cell may reach behind the last brick.
+  static constexpr int kBehind = 8 - (kRow + 2);
+  static constexpr float kLeast = -32768.0f, kZero = kLeast + 8192.0f, kMost = 32767.0f,
+                         kLargest = kMost - kZero;
 
-  /// Of one place in the table of bricks: where its nodes begin, first axis fastest, and
-  /// its unit.
+  /// Where a node lies behind the first of its brick, and the first node of a cell so that the others lie
+  /// behind it in the same half.
+  static constexpr int offsetOf(const Vec3i& node) {
+    return offsetAlongX(node.x) + node.y * kRow + node.z * kPlane;
+  }
+  static constexpr int offsetAlongX(int x) { return x < kHalfCells ? x : x - kHalfCells + kHalf; }
+
+  /// Of one place in the table of bricks: where its nodes begin, and its unit.
   struct Entry {
     std::uint32_t first;
     float unit;
@@ -37,7 +50,7 @@ class CodedBricks {
   CodedBricks() = default;
 
   /// Room for a pool of so many bricks, each to be `set` once, and then to be placed by `setTable`.
-  /// @throws Error if they are more than can be addressed (5.8 million).
+  /// @throws Error if they are more than can be addressed (5.3 million).
   explicit CodedBricks(std::size_t bricks);
   /// The nodes 0 to 8 of the bricks of a grid. Cost: one pass over its pool, all cores. @throws Error as
   /// above.
@@ -57,31 +70,34 @@ class CodedBricks {
   void setTable(std::span<const std::int32_t> table);
 
   bool isEmpty() const { return entries_.empty(); }
-  const std::uint16_t* codes() const { return codes_.get(); }
+  const std::int16_t* codes() const { return codes_.get(); }
   /// As many as the table of bricks has.
   const Entry* entries() const { return entries_.data(); }
   /// The value at a node, 0 to 8 on every axis, of the brick at a place in the table. Slow.
   float at(std::size_t place, const Vec3i& node) const {
     const Entry& entry = entries_[place];
-    const auto inside = std::size_t((node.z * kWidth + node.y) * kWidth + node.x);
-    return (float(codes_.get()[entry.first + inside]) - kZero) * entry.unit;
+    return (float(codes_.get()[entry.first + std::size_t(offsetOf(node))]) - kZero) * entry.unit;
   }
 
-  /// All kNodes of it.
+  /// All kNodes of it, first axis fastest.
   void decode(std::size_t place, float* nodes) const {
     const Entry entry = entries_[place];
-    const std::uint16_t* codes = codes_.get() + entry.first;
-    for (int n = 0; n != kNodes; ++n) nodes[n] = (float(codes[n]) - kZero) * entry.unit;
+    const std::int16_t* codes = codes_.get() + entry.first;
+    for (int row = 0; row != kWidth * kWidth; ++row, codes += kRow, nodes += kWidth) {
+      for (int x = 0; x != kHalfCells; ++x) nodes[x] = (float(codes[x]) - kZero) * entry.unit;
+      for (int x = 0; x != kHalfCells + 1; ++x)
+        nodes[kHalfCells + x] = (float(codes[kHalf + x]) - kZero) * entry.unit;
+    }
   }
 
   /// Copies share their codes.
   std::size_t memoryBytes() const {
-    return units_.size() * (kNodes * sizeof(std::uint16_t) + sizeof(float)) +
+    return units_.size() * (kCodes * sizeof(std::int16_t) + sizeof(float)) +
            entries_.capacity() * sizeof(Entry);
   }
   /// Those that a pool of so many bricks at so many places takes.
   static double estimateBytes(double bricks, double places) {
-    return bricks * (kNodes * sizeof(std::uint16_t) + sizeof(float)) + places * sizeof(Entry);
+    return bricks * (kCodes * sizeof(std::int16_t) + sizeof(float)) + places * sizeof(Entry);
   }
 
  private:
@@ -89,7 +105,7 @@ class CodedBricks {
   void setAll(const std::size_t (&strides)[2], const NodesOf& nodesOf, const Done& done);
 
   // Made to be set and then shared.
-  std::shared_ptr<std::uint16_t[]> codes_;
+  std::shared_ptr<std::int16_t[]> codes_;
   std::vector<float> units_;
   std::vector<Entry> entries_;
 };

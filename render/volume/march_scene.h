@@ -25,7 +25,7 @@ struct MarchScene {
     const std::int32_t* table = nullptr;
     Vec3i count{};
     /// See CodedBricks. Of the density and the suns marchRays reads these and not the values.
-    const std::uint16_t* codes = nullptr;
+    const std::int16_t* codes = nullptr;
     const CodedBricks::Entry* entries = nullptr;
   };
 

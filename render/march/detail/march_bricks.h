@@ -75,8 +75,9 @@ struct Places {
 
 constexpr float kJustBelow1 = 1.0f - 0x1p-24f;
 
-template <int kWidth>
-HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places) {
+// nodeOf(x, y, z) is where the first nodes of cells, 0 to 7 along every axis, lie in their brick.
+template <class NodeOf>
+HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places, NodeOf&& nodeOf) {
   const Lanes d;
   const IntLanes i;
   const auto within = [&](Floats x, int count) HWY_ATTR {
@@ -88,9 +89,8 @@ HWY_INLINE void locate(const MarchScene::Bricks& bricks, Point p, Places& places
   const Ints x = wholeOf(cell.x), y = wholeOf(cell.y), z = wholeOf(cell.z);
   const Ints row = hn::Add(hn::Mul(hn::ShiftRight<3>(z), hn::Set(i, bricks.count.y)), hn::ShiftRight<3>(y));
   hn::Store(hn::Add(hn::Mul(row, hn::Set(i, bricks.count.x)), hn::ShiftRight<3>(x)), i, places.entry);
-  const Ints inside = hn::Set(i, 7), width = hn::Set(i, kWidth);
-  const Ints line = hn::Add(hn::Mul(hn::And(z, inside), width), hn::And(y, inside));
-  hn::Store(hn::Add(hn::Mul(line, width), hn::And(x, inside)), i, places.node);
+  const Ints inside = hn::Set(i, 7);
+  hn::Store(nodeOf(hn::And(x, inside), hn::And(y, inside), hn::And(z, inside)), i, places.node);
   places.share = {hn::Sub(q.x, cell.x), hn::Sub(q.y, cell.y), hn::Sub(q.z, cell.z)};
 }
 
@@ -108,7 +108,10 @@ HWY_INLINE Floats read(const MarchScene::Bricks& bricks, const Places& places) {
 template <int kWidth, int kBefore>
 HWY_INLINE Floats sampleBricks(const MarchScene::Bricks& bricks, Point p) {
   Places places;
-  locate<kWidth>(bricks, p, places);
+  locate(bricks, p, places, [](Ints x, Ints y, Ints z) HWY_ATTR {
+    const Ints width = hn::Set(IntLanes(), kWidth);
+    return hn::Add(hn::Mul(hn::Add(hn::Mul(z, width), y), width), x);
+  });
   return read<kWidth, kBefore>(bricks, places);
 }
 

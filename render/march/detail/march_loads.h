@@ -10,7 +10,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 
 #include "nephele/render/march/detail/march_lanes.h"
 
@@ -42,40 +41,6 @@ HWY_INLINE hn::Vec<D> pairsAt(D d, const float* const* HWY_RESTRICT at, int offs
     constexpr int quarter = int(hn::MaxLanes(D())) / 4;
     return hn::Combine(d, pairsAt(half, at + quarter, offset), pairsAt(half, at, offset));
   }
-#endif
-}
-
-// One vector of some that follow each other.
-template <class D, class Part>
-HWY_INLINE hn::Vec<D> joined([[maybe_unused]] D d, const Part* parts) {
-#if HWY_TARGET == HWY_SCALAR
-  return parts[0];
-#else
-  if constexpr (sizeof(hn::Vec<D>) == sizeof(Part))
-    return parts[0];
-  else
-    return hn::Combine(d, parts[1], parts[0]);
-#endif
-}
-
-// The 32 bits that lie `offset` codes behind at[n], for every lane.
-template <class D>
-HWY_INLINE hn::Vec<D> wordsAt([[maybe_unused]] D d, const std::uint16_t* const* HWY_RESTRICT at, int offset) {
-  constexpr int kCount = int(hn::MaxLanes(D()));
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128 && HWY_TARGET != HWY_SCALAR
-  if constexpr (kCount == 4) {
-    const auto two = [&](int n) HWY_ATTR {
-      return _mm_unpacklo_epi32(_mm_loadu_si32(at[n] + offset), _mm_loadu_si32(at[n + 1] + offset));
-    };
-    return hn::Vec<D>{_mm_castsi128_ps(_mm_unpacklo_epi64(two(0), two(2)))};
-  } else {
-    const hn::Half<D> half;
-    return hn::Combine(d, wordsAt(half, at + kCount / 2, offset), wordsAt(half, at, offset));
-  }
-#else
-  float words[kCount];
-  for (int n = 0; n != kCount; ++n) std::memcpy(words + n, at[n] + offset, sizeof(float));
-  return hn::LoadU(d, words);
 #endif
 }
 

@@ -84,7 +84,7 @@ inline void Marcher<kColours>::light(const LitPart<kColours>& steps) {
   readLight();
   located_ = steps, isLocated_ = true;
   for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun)
-    locate<CodedBricks::kWidth>(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun]);
+    locateCoded(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun]);
   if (!scene_.scattered.empty())
     locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells_);
 }
@@ -98,22 +98,29 @@ inline void Marcher<kColours>::readLight() {
     const Floats bent = readCoded(scene_.suns[sun], places_[sun]), bend = hn::Set(d, scene_.suns[sun].bend),
                  column = hn::Sub(hn::Sqrt(hn::MulAdd(bent, bent, hn::Mul(bend, bend))), bend);
     // Of every colour of the result, and one where a weight is all colours'.
-    const int colours = kColours == 1 ? scene_.colours : kColours;
-    Floats sums[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    for (int n = 0; n != scene_.octaves; ++n) {
-      Floats lit[kColours];
-      for (int c = 0; c != kColours; ++c) {
-        const float share = scene_.extinction * scene_.attenuation[n] *
-                            (kColours == 1 ? 1.0f : scene_.extinctionColour[c]) * scene_.suns[sun].shadow[c];
-        lit[c] = expOfMinus(hn::Min(hn::Mul(column, hn::Set(d, share)), hn::Set(d, 80.0f)));
+    const auto add = [&]<int kSums>() HWY_ATTR {
+      Floats sums[kSums];
+      for (Floats& sum : sums) sum = hn::Zero(d);
+      for (int n = 0; n != scene_.octaves; ++n) {
+        Floats lit[kColours];
+        for (int c = 0; c != kColours; ++c) {
+          const float share = scene_.extinction * scene_.attenuation[n] *
+                              (kColours == 1 ? 1.0f : scene_.extinctionColour[c]) *
+                              scene_.suns[sun].shadow[c];
+          lit[c] = expOfMinus(hn::Min(hn::Mul(column, hn::Set(d, share)), hn::Set(d, 80.0f)));
+        }
+        for (int c = 0; c != kSums; ++c)
+          sums[c] = hn::MulAdd(lit[kColours == 1 ? 0 : c], hn::Set(d, ray_.weight[sun][c][n]), sums[c]);
       }
-      for (int c = 0; c != colours; ++c)
-        sums[c] = hn::MulAdd(lit[kColours == 1 ? 0 : c], hn::Set(d, ray_.weight[sun][c][n]), sums[c]);
-    }
-    for (int c = 0; c != colours; ++c) {
-      Floats& sum = sums_[3 * sun + std::size_t(c)];
-      sum = hn::MulAdd(sums[c], steps.weight[kColours == 1 ? 0 : c], sum);
-    }
+      for (int c = 0; c != kSums; ++c) {
+        Floats& sum = sums_[3 * sun + std::size_t(c)];
+        sum = hn::MulAdd(sums[c], steps.weight[kColours == 1 ? 0 : c], sum);
+      }
+    };
+    if (kColours == 1 && scene_.colours == 1)
+      add.template operator()<1>();
+    else
+      add.template operator()<3>();
   }
   for (std::size_t n = 0; n != scene_.locals.size(); ++n)
     addLocal(scene_, ray_, n, jitter_, steps.s, steps.length, steps.weight, result_);
@@ -128,19 +135,6 @@ inline void Marcher<kColours>::scattered(const LitPart<kColours>& steps) {
     readTwo(lattice.nodes, cells_, two);
     for (int n = 0; n != 2; ++n, ++sum)
       *sum = hn::MulAdd(two[n], steps.weight[kColours == 1 ? 0 : lattice.kinds[n].part], *sum);
-  }
-}
-
-template <int kColours>
-inline void Marcher<kColours>::addSums(MarchResult& result) const {
-  const Lanes d;
-  const Floats* sum = sums_;
-  for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun, sum += 3)
-    for (int c = 0; c != scene_.colours; ++c) result.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, sum[c]));
-  for (const MarchScene::Scattered& lattice : scene_.scattered) {
-    for (int n = 0; n != lattice.count; ++n)
-      result.of(lattice.kinds[n]) += hn::GetLane(hn::SumOfLanes(d, sum[n]));
-    sum += 2;
   }
 }
 

@@ -13,7 +13,7 @@
 
 #include "nephele/render/march/detail/marcher.h"
 
-/// What a Marcher hides behind holdouts, and what it records for deep pictures.
+/// What a Marcher hides behind holdouts, what it records for deep pictures, and what it adds to a result.
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
@@ -60,6 +60,19 @@ inline void Marcher<kColours>::record(float before, const float* after, int used
     opacity = isHeld_ ? opacity + seen_[i] * gain : scene_.meanOpacity(after[i]);
     record_->steps.push_back({begin_[i], begin_[i] + ds_[i], opacity});
     before = after[i];
+  }
+}
+
+template <int kColours>
+inline void Marcher<kColours>::addSums(MarchResult& result) const {
+  const Lanes d;
+  const Floats* sum = sums_;
+  for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun, sum += 3)
+    for (int c = 0; c != scene_.colours; ++c) result.suns[sun][c] += hn::GetLane(hn::SumOfLanes(d, sum[c]));
+  for (const MarchScene::Scattered& lattice : scene_.scattered) {
+    for (int n = 0; n != lattice.count; ++n)
+      result.of(lattice.kinds[n]) += hn::GetLane(hn::SumOfLanes(d, sum[n]));
+    sum += 2;
   }
 }
 

@@ -114,8 +114,8 @@ TEST(CodedBricks, AreTheSameByAllInstructionsAndOfNodesSideBySide) {
       ASSERT_EQ(coded.entries()[place].first, expected.entries()[place].first);
       ASSERT_EQ(coded.entries()[place].unit, expected.entries()[place].unit);
       ASSERT_EQ(sideBySide.entries()[place].unit, expected.entries()[place].unit);
-      const std::uint16_t* codes = expected.codes() + expected.entries()[place].first;
-      const std::size_t bytes = CodedBricks::kNodes * sizeof(std::uint16_t);
+      const std::int16_t* codes = expected.codes() + expected.entries()[place].first;
+      const std::size_t bytes = CodedBricks::kCodes * sizeof(std::int16_t);
       ASSERT_EQ(std::memcmp(coded.codes() + coded.entries()[place].first, codes, bytes), 0);
       ASSERT_EQ(std::memcmp(sideBySide.codes() + sideBySide.entries()[place].first, codes, bytes), 0);
     }
