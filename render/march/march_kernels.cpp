@@ -25,6 +25,7 @@
 #include "nephele/render/march/detail/marcher_light.h"
 #include "nephele/render/march/detail/marcher_record.h"
 #include "nephele/render/march/detail/marcher_steps.h"
+#include "nephele/render/march/detail/marcher_take.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
@@ -50,16 +51,16 @@ HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchRe
 
 void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
                 std::size_t count) {
-  const float opaque = detail::opaqueDepth(scene);
+  const detail::StepGrowth growth(scene);
   BrickRows rows;
   marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     const int lane = int(i % kLanes);
     if (lane == 0)
-      findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, opaque, rows);
+      findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, growth.opaque, rows);
     detail::forEachRun(
-        scene, rays[i], opaque,
-        [&](auto&& visit) HWY_ATTR { forEachBrick(scene, rays[i], opaque, rows, lane, visit); },
-        [&](float s, float ds, int n, float density) { return marcher.take(s, ds, n, density); });
+        scene, rays[i], growth,
+        [&](auto&& visit) HWY_ATTR { forEachBrick(scene, rays[i], growth.opaque, rows, lane, visit); },
+        [&](const auto&... steps) { return marcher.take(steps...); });
   });
 }
 

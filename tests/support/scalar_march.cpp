@@ -169,13 +169,26 @@ void marchRaysScalar(const MarchScene& scene, std::span<const MarchRay> rays,
         return visit(s0, s1, scene.ranges[pool]);
       });
     };
-    detail::forEachRun(
-        scene, rays[i], detail::opaqueDepth(scene), walk, [&](float start, float ds, int count, float) {
-          for (int n = 0; n != count; ++n)
-            if (!stepScalar(scene, rays[i], start + (float(n) + rays[i].jitter) * ds, ds, results[i]))
-              return false;
-          return true;
-        });
+    const auto step = [&](float begin, float ds) {
+      return stepScalar(scene, rays[i], begin + rays[i].jitter * ds, ds, results[i]);
+    };
+    struct Take {
+      const decltype(step)& one;
+
+      bool operator()(float start, float ds, int count, float) const {
+        for (int n = 0; n != count; ++n)
+          if (!one(start + float(n) * ds, ds)) return false;
+        return true;
+      }
+      bool operator()(const detail::GrowingSteps& steps, float) const {
+        for (int n = 0; n != steps.count; ++n) {
+          const float begin = steps.placeOf(float(n));
+          if (!one(begin, steps.placeOf(float(n + 1)) - begin)) return false;
+        }
+        return true;
+      }
+    };
+    detail::forEachRun(scene, rays[i], detail::StepGrowth(scene), walk, Take{step});
   }
 }
 

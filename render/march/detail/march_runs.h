@@ -5,25 +5,15 @@
 #include <cstdint>
 #include <utility>
 
+#include "nephele/render/march/detail/step_growth.h"
 #include "nephele/render/march/march_kernels.h"
 
 namespace nephele::detail {
 
-/// How much longer steps may be behind an optical depth for the same error in the picture: that of a step is
-/// as its transmittance and the cube of its length. The start of the exponential's series is near enough.
-inline float stepGrowth(const MarchScene& scene, float depth) {
-  const float x = depth * scene.leastColour() * (1.0f / 3);
-  return std::min(1 + x + 0.5f * x * x, scene.mostGrowth);
-}
-
-/// Optical depth behind which less than the cutoff is seen of any colour.
-inline float opaqueDepth(const MarchScene& scene) {
-  return -std::log(scene.cutoff) / scene.leastColour();
-}
-
-/// Cuts the occupied part of a ray into runs of equal steps: calls take(s, ds, count, density), where steps
-/// start at s, s + ds ..., and stops when it returns false, or where the ranges of the bricks in front
-/// promise that nothing is left to see. `density` is negative where it has to be looked up.
+/// Cuts the occupied part of a ray into runs of equal steps, and in constant densities of growing ones: calls
+/// take(s, ds, count, density), where steps start at s, s + ds ..., or take(GrowingSteps, density), and stops
+/// when it returns false, or where the ranges of the bricks in front promise that nothing is left to see.
+/// `density` is negative where it has to be looked up.
 ///
 /// Runs go on from brick to brick where bricks touch, so that their borders leave no trace, and start anew
 /// behind a gap. Steps grow with the optical depth that the ranges of the bricks in front promise. All of it
@@ -31,8 +21,8 @@ inline float opaqueDepth(const MarchScene& scene) {
 template <class Take>
 class Runs {
  public:
-  Runs(const MarchScene& scene, const MarchRay& ray, float opaque, Take& take)
-      : scene_(scene), ray_(ray), take_(take), opaque_(opaque) {}
+  Runs(const MarchScene& scene, const MarchRay& ray, const StepGrowth& growth, Take& take)
+      : scene_(scene), ray_(ray), take_(take), law_(growth) {}
 
   /// A brick of this range from s0 to s1. False once there is no need to go on.
   [[gnu::always_inline]] bool add(float s0, float s1, const Interval& range) {
@@ -43,12 +33,12 @@ class Runs {
     const float least =
         std::max(thickest * wide > scene_.stepDepth ? scene_.stepDepth / thickest : wide, scene_.leastStep);
     const float depth = depth_ + (isUniform_ ? thinnest_ * (end_ - start_) : 0.0f),
-                growth = isUniform_ ? stepGrowth(scene_, depth) : growth_;
+                growth = isUniform_ ? law_.at(depth) : growth_;
     // Where the density varies it must still be met at every voxel.
     const float ds = isUniform ? least : std::min(least * growth, std::max(least, scene_.step));
     const bool isSame = isUniform == isUniform_ && !(s0 > end_) &&
                         (isUniform ? range.isPoint() && range.max == density_ : ds == ds_),
-               isLong = isUniform_ ? !(depth < opaque_) : !((end_ - start_) * perStep_ < kMany);
+               isLong = isUniform_ ? !(depth < law_.opaque) : !((end_ - start_) * perStep_ < kMany);
     if (!isSame || isLong) {
       if (!close()) return false;
       start_ = std::max(start_, s0);
@@ -70,7 +60,7 @@ class Runs {
     if (ray_.isCut && end_ >= ray_.length) ds = (end_ - start_) / float(count);
     const float start = std::exchange(start_, start_ + float(count) * ds);
     end_ = start_;
-    return take_(start, ds, count, -1.0f) && depth_ < opaque_;
+    return take_(start, ds, count, -1.0f) && depth_ < law_.opaque;
   }
 
  private:
@@ -89,32 +79,28 @@ class Runs {
 
   [[gnu::always_inline]] void promise(float depth) {
     depth_ += depth;
-    growth_ = stepGrowth(scene_, depth_);
+    growth_ = law_.at(depth_);
   }
 
-  // Steps may be longer than voxels, of lengths that grow.
+  // Steps may be longer than voxels.
   [[gnu::always_inline]] bool closeUniform() {
-    const float s1 = end_;
-    for (float cursor = start_; cursor < s1;) {
-      float ds = ds_ * growth_;
-      // As far as the growth is about the same.
-      const float end =
-          thinnest_ * (s1 - cursor) > 1 ? std::min(s1, cursor + std::max(1.0f / thinnest_, ds)) : s1;
-      const int count = int(std::ceil((end - cursor) / ds));
-      // The last of them must not reach into a brick that differs.
-      if (end == s1) ds = (s1 - cursor) / float(count);
-      const float start = std::exchange(cursor, cursor + float(count) * ds);
-      promise(thinnest_ * (std::min(cursor, s1) - start));
-      start_ = end_ = cursor;
-      if (!take_(start, ds, count, density_) || !(depth_ < opaque_)) return false;
+    const float s0 = std::exchange(start_, end_), depth = depth_, thickness = thinnest_ * (end_ - s0);
+    promise(thickness);
+    if (thickness > 1) {
+      // What is seen of them.
+      const float s1 = depth_ < law_.opaque ? end_ : s0 + (law_.opaque - depth) / thinnest_;
+      return take_(GrowingSteps(law_, s0, s1, ds_, thinnest_, depth), density_) && depth_ < law_.opaque;
     }
-    return true;
+    const float ds = ds_ * law_.at(depth);
+    const int count = std::max(int(std::ceil((end_ - s0) / ds)), 1);
+    // The last of them must not reach into a brick that differs.
+    return take_(s0, (end_ - s0) / float(count), count, density_) && depth_ < law_.opaque;
   }
 
   const MarchScene& scene_;
   const MarchRay& ray_;
   Take& take_;
-  const float opaque_;
+  const StepGrowth& law_;
   // The run so far: where it began and how far it has to go.
   float start_ = 0.0f, end_ = 0.0f, ds_ = 0.0f, perStep_ = 0.0f;
   // Whether its density hardly varies: then it is constant where this is not negative, and `thinnest_` is the
@@ -129,9 +115,9 @@ class Runs {
 
 /// walk(visit) calls visit(s0, s1, range) for every brick with density, near to far, until it returns false.
 template <class Walk, class Take>
-[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray, float opaque,
-                                              Walk&& walk, Take&& take) {
-  Runs runs(scene, ray, opaque, take);
+[[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray,
+                                              const StepGrowth& growth, Walk&& walk, Take&& take) {
+  Runs runs(scene, ray, growth, take);
   bool goesOn = true;
   walk([&](float s0, float s1, const Interval& range)
            __attribute__((always_inline)) { return goesOn = !(s0 < s1) || runs.add(s0, s1, range); });

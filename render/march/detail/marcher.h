@@ -16,6 +16,7 @@
 #include "nephele/render/march/detail/march_bricks.h"
 #include "nephele/render/march/detail/march_coded_bricks.h"
 #include "nephele/render/march/detail/march_lattice.h"
+#include "nephele/render/march/detail/step_growth.h"
 #include "nephele/render/march/march_kernels.h"
 #include "nephele/render/volume/brick_walk.h"
 
@@ -48,8 +49,8 @@ class Marcher {
   // `count` steps of length `ds` from `start` on, of this density if it is not negative. False once the ray
   // is as good as opaque.
   bool take(float start, float ds, int count, float density);
-
-  // One step that is known. False once the ray is as good as opaque.
+  bool take(const detail::GrowingSteps& steps, float density);
+  // One step that is known.
   bool take(const MarchStep& step);
 
   void finish() {
@@ -61,17 +62,18 @@ class Marcher {
   }
 
  private:
+  // stepsOf(n, length) sets the lengths of steps of these numbers, and returns where they begin.
+  template <class StepsOf>
+  HWY_INLINE bool takeAll(int count, float density, StepsOf&& stepsOf);
+
   // Adds the steps collected. False once the ray is as good as opaque.
   bool flush();
 
   // Fills the last vector with steps of no length at the place of the last.
   void repeatLast();
-
   bool someUnknown(int end) const;
-
   // Densities that are known in place of those looked up, if any were.
   void takeKnown(int end, bool wereLookedUp, float* density);
-
   // What the holdout leaves of every step, and of its opacity.
   void hold(float before, const float* after, int used);
 
@@ -97,13 +99,11 @@ class Marcher {
 
   // Of all that wait for it.
   void lightAll();
-
   // Finds where the light of steps is. It is read when the next densities have been found: one wait for both.
   void light(const LitPart<kColours>& steps);
 
   // Adds the light that located steps send to the eye.
   void readLight();
-
   // The part of it that the lattices hold.
   void scattered(const LitPart<kColours>& steps);
 

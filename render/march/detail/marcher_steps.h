@@ -1,4 +1,5 @@
-// How a Marcher collects steps. No #pragma once: read for every instruction set, by <hwy/foreach_target.h>.
+// How a Marcher adds a block of steps. No #pragma once: read for every instruction set, by
+// <hwy/foreach_target.h>.
 #if defined(NEPHELE_MARCHER_STEPS) == defined(HWY_TARGET_TOGGLE)
 #ifdef NEPHELE_MARCHER_STEPS
 #undef NEPHELE_MARCHER_STEPS
@@ -15,50 +16,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
-
-template <int kColours>
-inline bool Marcher<kColours>::take(float start, float ds, int count, float density) {
-  const Lanes d;
-  float begin = start;
-  start += ray_.jitter * ds;
-  while (count > 0) {
-    if (density >= 0 && !std::exchange(someKnown_, true)) std::fill_n(known_, kBlock, -1.0f);
-    // Whole vectors: the processor would wait long before it loads one that was stored in parts.
-    for (int i = count_ / kLanes * kLanes; i < std::min(count_ + count, kBlock); i += kLanes) {
-      const Floats index = hn::Iota(d, float(i - count_));
-      const auto isNew = hn::Ge(index, hn::Zero(d));
-      const auto put = [&](Floats values, float* block) HWY_ATTR {
-        hn::Store(hn::IfThenElse(isNew, values, hn::Load(d, block + i)), d, block + i);
-      };
-      put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, start)), s_);
-      put(hn::Set(d, ds), ds_);
-      if (needsBegin_) put(hn::MulAdd(index, hn::Set(d, ds), hn::Set(d, begin)), begin_);
-      if (someKnown_) put(hn::Set(d, density), known_);
-    }
-    const int taken = std::min(count, kBlock - count_);
-    count_ += taken;
-    count -= taken;
-    start += float(taken) * ds;
-    begin += float(taken) * ds;
-    if (count_ == kBlock && (!flush() || isHidden_)) return false;
-  }
-  return true;
-}
-
-template <int kColours>
-inline bool Marcher<kColours>::take(const MarchStep& step) {
-  jitter_ = 0.5f;
-  s_[count_] = step.place;
-  begin_[count_] = step.begin;
-  ds_[count_] = step.length;
-  known_[count_] = step.opticalDepth / (scene_.extinction * step.length);
-  someKnown_ = true;
-  for (int c = 0; c != kColours; ++c) {
-    colours_[c][count_] = step.colour[c];
-    glows_[c][count_] = step.glow[c];
-  }
-  return ++count_ != kBlock || (flush() && !isHidden_);
-}
 
 template <int kColours>
 inline bool Marcher<kColours>::flush() {
