@@ -86,7 +86,8 @@ class Runs {
   [[gnu::always_inline]] bool closeUniform() {
     const float s0 = std::exchange(start_, end_), depth = depth_, thickness = thinnest_ * (end_ - s0);
     promise(thickness);
-    if (thickness > 1) {
+    // Far enough for steps to grow by more than a third.
+    if (thickness * law_.xPerDepth > 1.0f / 3) {
       // What is seen of them.
       const float s1 = depth_ < law_.opaque ? end_ : s0 + (law_.opaque - depth) / thinnest_;
       return take_(GrowingSteps(law_, s0, s1, ds_, thinnest_, depth), density_) && depth_ < law_.opaque;
