@@ -5,7 +5,7 @@
 // exactly, whatever the steps are.
 //
 // As many rays as a vector has lanes find the bricks on their way together; then one after the other is
-// marched. Steps are gathered into blocks of 32 that run across bricks. Densities of a block are looked up as
+// marched. Steps are gathered into blocks of 64 that run across bricks. Densities of a block are looked up as
 // vectors: brick table, then the eight corners. So is the light, in every sun's column densities and in the
 // scattered light, of those steps alone that add to the picture, once they fill a vector. Densities and
 // columns are CodedBricks, half as many bytes to wait for.

@@ -79,7 +79,7 @@ struct MarchRecord {
   void clear() { steps.clear(), marks.clear(); }
 };
 
-/// Marches rays with the widest instructions that the machine has, 32 samples of a ray at a time. Fills in as
+/// Marches rays with the widest instructions that the machine has, 64 samples of a ray at a time. Fills in as
 /// many `records` as there are rays, or none; they do not change the results.
 ///
 /// Behind a holdout with transmittance H the weight of a step is H T (1 - dT), and T goes on as without it.

@@ -25,7 +25,7 @@ namespace nephele::HWY_NAMESPACE {
 
 // Enough that the processor need not wait for one vector before it starts the next, and few enough that a ray
 // ends soon behind what hides the rest.
-constexpr int kBlock = 32;
+constexpr int kBlock = 64;
 
 // One ray's march: collects steps, adds the opacity of a block of them at a time, and the light of a vector
 // of those that are seen. Three colours where MarchScene::isColoured, else one.
@@ -38,7 +38,8 @@ class Marcher {
         result_(result),
         record_(record),
         isHeld_(!ray.holdout.empty()),
-        needsBegin_(isHeld_ || record) {
+        needsBegin_(isHeld_ || record),
+        together_(record ? kBlock / 2 : kBlock) {
     std::fill_n(through_, kColours, 1.0f);
     // Parts of vectors are put into what is there.
     for (int i = 0; i != kBlock; i += kLanes)
@@ -83,7 +84,6 @@ class Marcher {
 
   // The result so far, with the light that is waited for; what is added later stays as without a record.
   void mark();
-
   // The steps of a block, before its light is added.
   void record(float before, const float* after, int used);
 
@@ -96,7 +96,6 @@ class Marcher {
             const LitPart<kColours>& steps);
 
   void colour(Floats own, LitPart<kColours>& steps);
-
   // Of all that wait for it.
   void lightAll();
   // Finds where the light of steps is. It is read when the next densities have been found: one wait for both.
@@ -104,8 +103,9 @@ class Marcher {
 
   // Adds the light that located steps send to the eye.
   void readLight();
+  void readLight(int located);
   // The part of it that the lattices hold.
-  void scattered(const LitPart<kColours>& steps);
+  void scattered(const LitPart<kColours>& steps, const Cells& cells);
 
   // Of the light so far, a vector each: three colours of every sun, then the scattered lattices.
   static constexpr std::size_t kMostSums = 3 * MarchScene::kMostSuns + 2 * MarchScene::kMostScattered;
@@ -118,10 +118,10 @@ class Marcher {
   MarchResult& result_;
   MarchRecord* record_;
   const bool isHeld_, needsBegin_;
-  // Whether some densities of the block need no look-up.
-  bool someKnown_ = false;
-  // Nothing farther away is seen.
-  bool isHidden_ = false;
+  // Steps of a block: fewer where every block is marked in the record.
+  const int together_;
+  // Whether some densities of the block need no look-up, and whether nothing farther away is seen.
+  bool someKnown_ = false, isHidden_ = false;
   std::size_t holdoutCursor_ = 0;
   // Where in its step a sample is, about.
   float jitter_ = ray_.jitter;
@@ -132,15 +132,15 @@ class Marcher {
   alignas(64) float colours_[kColours][kBlock] = {};
   alignas(64) float glows_[kColours][kBlock] = {};
   int count_ = 0;
-  float depth_ = 0.0f;
-  // What is left of light from behind, per colour.
-  float through_[kColours];
+  // Optical depth, and what is left of light from behind, per colour.
+  float depth_ = 0.0f, through_[kColours];
   LitSteps<kColours> lit_;
   // Steps whose light is located, and where it is.
-  bool isLocated_ = false;
-  LitPart<kColours> located_;
-  Places places_[MarchScene::kMostSuns];
-  Cells cells_;
+  static constexpr int kMostLocated = kBlock / kLanes;
+  int locatedCount_ = 0;
+  LitPart<kColours> located_[kMostLocated];
+  Places places_[MarchScene::kMostSuns][kMostLocated];
+  Cells cells_[kMostLocated];
   Floats sums_[kMostSums];
 };
 

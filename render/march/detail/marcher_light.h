@@ -33,7 +33,10 @@ HWY_INLINE void Marcher<kColours>::weigh(int first, Floats own, Floats after, Fl
   const auto isSeen = hn::Gt(most, hn::Set(d, scene_.cutoff));
   for (Floats& weight : steps.weight) weight = hn::IfThenElseZero(isSeen, weight);
   if constexpr (kColours == 3) {
-    if (scene_.glows()) glow(first, own, before, seen, steps);
+    if (scene_.glows()) {
+      for (Floats& left : before) left = hn::IfThenElseZero(isSeen, left);
+      glow(first, own, before, seen, steps);
+    }
     if (scene_.colour.table) colour(own, steps);
   }
   if (isHeld_)
@@ -74,28 +77,30 @@ inline void Marcher<kColours>::colour(Floats own, LitPart<kColours>& steps) {
 }
 
 template <int kColours>
-inline void Marcher<kColours>::lightAll() {
-  if (!lit_.empty()) light(lit_.take());
-  readLight();
-}
-
-template <int kColours>
 inline void Marcher<kColours>::light(const LitPart<kColours>& steps) {
-  readLight();
-  located_ = steps, isLocated_ = true;
+  if (locatedCount_ == kMostLocated) readLight();
+  const int own = locatedCount_++;
+  located_[own] = steps;
   for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun)
-    locateCoded(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun]);
+    locateCoded(scene_.suns[sun], pointAt(ray_.suns[sun], steps.s), places_[sun][own]);
   if (!scene_.scattered.empty())
-    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize), cells_);
+    locate(scene_.scatteredSize, clamped(pointAt(ray_.scattered, steps.s), scene_.scatteredSize),
+           cells_[own]);
 }
 
 template <int kColours>
 inline void Marcher<kColours>::readLight() {
-  if (!std::exchange(isLocated_, false)) return;
+  for (int n = 0; n != locatedCount_; ++n) readLight(n);
+  locatedCount_ = 0;
+}
+
+template <int kColours>
+inline void Marcher<kColours>::readLight(int located) {
   const Lanes d;
-  const LitPart<kColours>& steps = located_;
+  const LitPart<kColours>& steps = located_[located];
   for (std::size_t sun = 0; sun != scene_.suns.size(); ++sun) {
-    const Floats bent = readCoded(scene_.suns[sun], places_[sun]), bend = hn::Set(d, scene_.suns[sun].bend),
+    const Floats bent = readCoded(scene_.suns[sun], places_[sun][located]),
+                 bend = hn::Set(d, scene_.suns[sun].bend),
                  column = hn::Sub(hn::Sqrt(hn::MulAdd(bent, bent, hn::Mul(bend, bend))), bend);
     // Of every colour of the result, and one where a weight is all colours'.
     const auto add = [&]<int kSums>() HWY_ATTR {
@@ -124,15 +129,15 @@ inline void Marcher<kColours>::readLight() {
   }
   for (std::size_t n = 0; n != scene_.locals.size(); ++n)
     addLocal(scene_, ray_, n, jitter_, steps.s, steps.length, steps.weight, result_);
-  scattered(steps);
+  scattered(steps, cells_[located]);
 }
 
 template <int kColours>
-inline void Marcher<kColours>::scattered(const LitPart<kColours>& steps) {
+inline void Marcher<kColours>::scattered(const LitPart<kColours>& steps, const Cells& cells) {
   Floats* sum = sums_ + 3 * scene_.suns.size();
   for (const MarchScene::Scattered& lattice : scene_.scattered) {
     Floats two[2];
-    readTwo(lattice.nodes, cells_, two);
+    readTwo(lattice.nodes, cells, two);
     for (int n = 0; n != 2; ++n, ++sum)
       *sum = hn::MulAdd(two[n], steps.weight[kColours == 1 ? 0 : lattice.kinds[n].part], *sum);
   }

@@ -36,6 +36,12 @@ inline void Marcher<kColours>::hold(float before, const float* after, int used) 
 }
 
 template <int kColours>
+inline void Marcher<kColours>::lightAll() {
+  if (!lit_.empty()) light(lit_.take());
+  readLight();
+}
+
+template <int kColours>
 inline void Marcher<kColours>::mark() {
   readLight();
   const MarchResult before = result_;

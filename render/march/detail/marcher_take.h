@@ -50,7 +50,7 @@ HWY_INLINE bool Marcher<kColours>::takeAll(int count, float density, StepsOf&& s
   const Lanes d;
   for (int done = 0; done != count;) {
     if (density >= 0 && !std::exchange(someKnown_, true)) std::fill_n(known_, kBlock, -1.0f);
-    const int taken = std::min(count - done, kBlock - count_);
+    const int taken = std::min(count - done, together_ - count_);
     // Whole vectors: the processor would wait long before it loads one that was stored in parts.
     for (int i = count_ / kLanes * kLanes; i < count_ + taken; i += kLanes) {
       const Floats index = hn::Iota(d, float(i - count_));
@@ -67,7 +67,7 @@ HWY_INLINE bool Marcher<kColours>::takeAll(int count, float density, StepsOf&& s
     }
     count_ += taken;
     done += taken;
-    if (count_ == kBlock && (!flush() || isHidden_)) return false;
+    if (count_ == together_ && (!flush() || isHidden_)) return false;
   }
   return true;
 }
@@ -84,7 +84,7 @@ inline bool Marcher<kColours>::take(const MarchStep& step) {
     colours_[c][count_] = step.colour[c];
     glows_[c][count_] = step.glow[c];
   }
-  return ++count_ != kBlock || (flush() && !isHidden_);
+  return ++count_ != together_ || (flush() && !isHidden_);
 }
 
 }  // namespace nephele::HWY_NAMESPACE

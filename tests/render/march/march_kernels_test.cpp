@@ -66,7 +66,7 @@ TEST(MarchKernels, AgreeWithTheScalarLoop) {
       std::vector<MarchResult> results(rays.size());
       marchRays(scene, rays, results);
       for (std::size_t i = 0; i != rays.size(); ++i) {
-        // The vectors notice only every 32 samples that nothing is left to see.
+        // The vectors notice only every 64 samples that nothing is left to see.
         const float seen = std::exp(-expected[i].opticalDepth);
         ASSERT_NEAR(std::exp(-results[i].opticalDepth), seen, 1.1e-4f);
         for (int c = 0; c != 3; ++c) ASSERT_NEAR(results[i].sky[c], expected[i].sky[c], 2e-4f);
