@@ -73,7 +73,7 @@ struct LightVolume::Sweep {
   /// World length of a slice along the light, and whether the light is at the upper end of w.
   float step;
   bool fromAbove;
-  int sampleStride[3] = {1, BrickGrid::kWidth, BrickGrid::kWidth* BrickGrid::kWidth};
+  int sampleStride[3] = {1, BrickGrid::kWidth, BrickGrid::kVolume / BrickGrid::kWidth};
 
   Sweep(const RenderVolume& volume, const Vec3f& light, float mostDensity)
       : grid(volume.density()), coded(volume.hasSamples() ? nullptr : &volume.coded()), most(mostDensity) {

@@ -8,7 +8,7 @@
 // marched. Steps are gathered into blocks of 64 that run across bricks. Densities of a block are looked up as
 // vectors: brick table, then the eight corners. So is the light, in every sun's column densities and in the
 // scattered light, of those steps alone that add to the picture, once they fill a vector. Densities and
-// columns are CodedBricks, half as many bytes to wait for.
+// columns are CodedBricks, about half as many bytes to wait for.
 //
 // Limits: pool bricks are indexed by 32 bits (RenderVolume refuses more).
 #undef HWY_TARGET_INCLUDE
@@ -51,15 +51,15 @@ HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchRe
 
 void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* results, MarchRecord* records,
                 std::size_t count) {
-  const detail::StepGrowth growth(scene);
+  const detail::StepGrowth law(scene);
   BrickRows rows;
   marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     const int lane = int(i % kLanes);
     if (lane == 0)
-      findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, growth.opaque, rows);
+      findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, law.opaque, rows);
     detail::forEachRun(
-        scene, rays[i], growth,
-        [&](auto&& visit) HWY_ATTR { forEachBrick(scene, rays[i], growth.opaque, rows, lane, visit); },
+        scene, rays[i], law,
+        [&](auto&& visit) HWY_ATTR { forEachBrick(scene, rays[i], law.opaque, rows, lane, visit); },
         [&](const auto&... steps) { return marcher.take(steps...); });
   });
 }

@@ -80,7 +80,8 @@ struct MarchRecord {
 };
 
 /// Marches rays with the widest instructions that the machine has, 64 samples of a ray at a time. Fills in as
-/// many `records` as there are rays, or none; they do not change the results.
+/// many `records` as there are rays, or none; they change the results by no more than what the cutoff leaves
+/// to be seen, as rays with records end after fewer steps.
 ///
 /// Behind a holdout with transmittance H the weight of a step is H T (1 - dT), and T goes on as without it.
 void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,

@@ -21,8 +21,8 @@ namespace nephele::detail {
 template <class Take>
 class Runs {
  public:
-  Runs(const MarchScene& scene, const MarchRay& ray, const StepGrowth& growth, Take& take)
-      : scene_(scene), ray_(ray), take_(take), law_(growth) {}
+  Runs(const MarchScene& scene, const MarchRay& ray, const StepGrowth& law, Take& take)
+      : scene_(scene), ray_(ray), take_(take), law_(law) {}
 
   /// A brick of this range from s0 to s1. False once there is no need to go on.
   [[gnu::always_inline]] bool add(float s0, float s1, const Interval& range) {
@@ -84,7 +84,8 @@ class Runs {
 
   // Steps may be longer than voxels.
   [[gnu::always_inline]] bool closeUniform() {
-    const float s0 = std::exchange(start_, end_), depth = depth_, thickness = thinnest_ * (end_ - s0);
+    const float s0 = std::exchange(start_, end_), depth = depth_, thickness = thinnest_ * (end_ - s0),
+                ds = ds_ * growth_;
     promise(thickness);
     // Far enough for steps to grow by more than a third.
     if (thickness * law_.xPerDepth > 1.0f / 3) {
@@ -92,7 +93,6 @@ class Runs {
       const float s1 = depth_ < law_.opaque ? end_ : s0 + (law_.opaque - depth) / thinnest_;
       return take_(GrowingSteps(law_, s0, s1, ds_, thinnest_, depth), density_) && depth_ < law_.opaque;
     }
-    const float ds = ds_ * law_.at(depth);
     const int count = std::max(int(std::ceil((end_ - s0) / ds)), 1);
     // The last of them must not reach into a brick that differs.
     return take_(s0, (end_ - s0) / float(count), count, density_) && depth_ < law_.opaque;
@@ -117,8 +117,8 @@ class Runs {
 /// walk(visit) calls visit(s0, s1, range) for every brick with density, near to far, until it returns false.
 template <class Walk, class Take>
 [[gnu::always_inline]] inline void forEachRun(const MarchScene& scene, const MarchRay& ray,
-                                              const StepGrowth& growth, Walk&& walk, Take&& take) {
-  Runs runs(scene, ray, growth, take);
+                                              const StepGrowth& law, Walk&& walk, Take&& take) {
+  Runs runs(scene, ray, law, take);
   bool goesOn = true;
   walk([&](float s0, float s1, const Interval& range)
            __attribute__((always_inline)) { return goesOn = !(s0 < s1) || runs.add(s0, s1, range); });

@@ -9,7 +9,6 @@
 #include <hwy/highway.h>
 
 #include <cstddef>
-#include <utility>
 
 #include "nephele/render/march/detail/marcher.h"
 

@@ -30,10 +30,10 @@ inline bool Marcher<kColours>::take(const detail::GrowingSteps& steps, float den
   const Lanes d;
   const auto placeOf = [&](Floats n) HWY_ATTR {
     const Floats v = hn::MulAdd(n, hn::Set(d, steps.each), hn::Set(d, steps.firstV)),
-                 grown = hn::Min(v, hn::Set(d, steps.growth.lastV)), six = hn::Set(d, 6.0f);
+                 grown = hn::Min(v, hn::Set(d, steps.law.lastV)), six = hn::Set(d, 6.0f);
     const Floats curve =
         hn::Div(hn::Mul(grown, hn::Sub(six, grown)), hn::NegMulAdd(hn::Set(d, 4.0f), grown, six));
-    const Floats x = hn::MulAdd(hn::Sub(v, grown), hn::Set(d, steps.growth.most), curve);
+    const Floats x = hn::MulAdd(hn::Sub(v, grown), hn::Set(d, steps.law.most), curve);
     return hn::MulAdd(hn::Sub(x, hn::Set(d, steps.firstX)), hn::Set(d, steps.lengthPerX),
                       hn::Set(d, steps.start));
   };

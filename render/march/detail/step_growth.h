@@ -48,21 +48,21 @@ struct StepGrowth {
 /// Steps through a constant density that grow all the way: the first of them `length` long behind nothing.
 struct GrowingSteps {
   /// From s0 to s1, which has `thickness` of optical depth per length, behind `depth`.
-  GrowingSteps(const StepGrowth& law, float s0, float s1, float length, float thickness, float depth)
-      : growth(law), start(s0) {
-    const float xPerLength = thickness * growth.xPerDepth, x0 = depth * growth.xPerDepth;
-    firstV = growth.vOf(x0);
-    const float v1 = growth.vOf(x0 + (s1 - s0) * xPerLength);
+  GrowingSteps(const StepGrowth& growthLaw, float s0, float s1, float length, float thickness, float depth)
+      : law(growthLaw), start(s0) {
+    const float xPerLength = thickness * law.xPerDepth, x0 = depth * law.xPerDepth;
+    firstV = law.vOf(x0);
+    const float v1 = law.vOf(x0 + (s1 - s0) * xPerLength);
     count = std::max(int(std::ceil((v1 - firstV) / (length * xPerLength))), 1);
     each = (v1 - firstV) / float(count);
-    firstX = growth.xOf(firstV);
+    firstX = law.xOf(firstV);
     lengthPerX = 1 / xPerLength;
   }
 
   /// Where step n begins.
-  float placeOf(float n) const { return start + (growth.xOf(firstV + n * each) - firstX) * lengthPerX; }
+  float placeOf(float n) const { return start + (law.xOf(firstV + n * each) - firstX) * lengthPerX; }
 
-  const StepGrowth& growth;
+  const StepGrowth& law;
   int count = 0;
   float start, firstV = 0.0f, each = 0.0f, firstX = 0.0f, lengthPerX = 0.0f;
 };
