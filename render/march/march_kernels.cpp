@@ -31,14 +31,14 @@ HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
 template <class March>
-HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, MarchResult* results,
+HWY_INLINE void marchEach(const MarchScene& scene, const MarchRay* rays, float opaque, MarchResult* results,
                           MarchRecord* records, std::size_t count, March&& march) {
   for (std::size_t i = 0; i != count; ++i) {
     results[i] = {};
     results[i].distance = std::numeric_limits<float>::infinity();
     if (records) records[i].clear();
     const auto one = [&]<int kColours>() HWY_ATTR {
-      Marcher<kColours> marcher(scene, rays[i], results[i], records ? records + i : nullptr);
+      Marcher<kColours> marcher(scene, rays[i], opaque, results[i], records ? records + i : nullptr);
       march(marcher, i);
       marcher.finish();
     };
@@ -53,7 +53,7 @@ void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* resu
                 std::size_t count) {
   const detail::StepGrowth law(scene);
   BrickRows rows;
-  marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
+  marchEach(scene, rays, law.opaque, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     const int lane = int(i % kLanes);
     if (lane == 0)
       findBricks(scene, rays + i, int(std::min<std::size_t>(kLanes, count - i)), 0.0f, law.opaque, rows);
@@ -66,7 +66,8 @@ void marchBatch(const MarchScene& scene, const MarchRay* rays, MarchResult* resu
 
 void marchStepsBatch(const MarchScene& scene, const MarchRay* rays, const std::span<const MarchStep>* steps,
                      MarchResult* results, MarchRecord* records, std::size_t count) {
-  marchEach(scene, rays, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
+  const float opaque = detail::StepGrowth(scene).opaque;
+  marchEach(scene, rays, opaque, results, records, count, [&](auto& marcher, std::size_t i) HWY_ATTR {
     for (const MarchStep& step : steps[i])
       if (!marcher.take(step)) break;
   });

@@ -80,8 +80,8 @@ struct MarchRecord {
 };
 
 /// Marches rays with the widest instructions that the machine has, 64 samples of a ray at a time. Fills in as
-/// many `records` as there are rays, or none; they change the results by no more than what the cutoff leaves
-/// to be seen, as rays with records end after fewer steps.
+/// many `records` as there are rays, or none, which changes no result. A ray ends with the first sample
+/// behind which less than the cutoff is seen.
 ///
 /// Behind a holdout with transmittance H the weight of a step is H T (1 - dT), and T goes on as without it.
 void marchRays(const MarchScene& scene, std::span<const MarchRay> rays, std::span<MarchResult> results,

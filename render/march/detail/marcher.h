@@ -32,11 +32,13 @@ constexpr int kBlock = 64;
 template <int kColours>
 class Marcher {
  public:
-  Marcher(const MarchScene& scene, const MarchRay& ray, MarchResult& result, MarchRecord* record)
+  Marcher(const MarchScene& scene, const MarchRay& ray, float opaque, MarchResult& result,
+          MarchRecord* record)
       : scene_(scene),
         ray_(ray),
         result_(result),
         record_(record),
+        opaque_(opaque),
         isHeld_(!ray.holdout.empty()),
         needsBegin_(isHeld_ || record),
         together_(record ? kBlock / 2 : kBlock) {
@@ -67,7 +69,7 @@ class Marcher {
   template <class StepsOf>
   HWY_INLINE bool takeAll(int count, float density, StepsOf&& stepsOf);
 
-  // Adds the steps collected. False once the ray is as good as opaque.
+  // Adds the steps collected, up to the first behind which nothing is seen: then false.
   bool flush();
 
   // Fills the last vector with steps of no length at the place of the last.
@@ -75,12 +77,8 @@ class Marcher {
   bool someUnknown(int end) const;
   // Densities that are known in place of those looked up, if any were.
   void takeKnown(int end, bool wereLookedUp, float* density);
-  // What the holdout leaves of every step, and of its opacity.
-  void hold(float before, const float* after, int used);
-
-  static bool isVisible(const float* opacity) {
-    return opacity[0] + opacity[1] + opacity[2] > 3 * detail::kVisibleOpacity;
-  }
+  // What the holdout leaves of every step, and of its opacity; up to which step, as nothing is seen of it.
+  int hold(float before, const float* after, int used);
 
   // The result so far, with the light that is waited for; what is added later stays as without a record.
   void mark();
@@ -117,11 +115,13 @@ class Marcher {
   const MarchRay& ray_;
   MarchResult& result_;
   MarchRecord* record_;
+  // Behind this optical depth nothing is seen.
+  const float opaque_;
   const bool isHeld_, needsBegin_;
   // Steps of a block: fewer where every block is marked in the record.
   const int together_;
-  // Whether some densities of the block need no look-up, and whether nothing farther away is seen.
-  bool someKnown_ = false, isHidden_ = false;
+  // Whether some densities of the block need no look-up.
+  bool someKnown_ = false;
   std::size_t holdoutCursor_ = 0;
   // Where in its step a sample is, about.
   float jitter_ = ray_.jitter;

@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace nephele::HWY_NAMESPACE {
 
 template <int kColours>
-inline void Marcher<kColours>::hold(float before, const float* after, int used) {
+inline int Marcher<kColours>::hold(float before, const float* after, int used) {
   for (int i = 0; i != used; ++i) {
     const float begin = ray_.start + begin_[i];
     seen_[i] = ray_.holdout.seen(begin * ray_.cosine, (begin + ds_[i]) * ray_.cosine, after[i] - before,
@@ -29,10 +29,13 @@ inline void Marcher<kColours>::hold(float before, const float* after, int used) 
                                             std::exp(-std::min(after[i] * share, 80.0f)));
     }
     before = after[i];
-    if (std::isinf(result_.distance) && isVisible(result_.heldOpacity)) result_.distance = ray_.start + s_[i];
+    const float* held = result_.heldOpacity;
+    if (std::isinf(result_.distance) && held[0] + held[1] + held[2] > 3 * detail::kVisibleOpacity)
+      result_.distance = ray_.start + s_[i];
+    if (seen_[i] <= scene_.cutoff) used = i + 1;
   }
-  for (int i = used; i != kBlock; ++i) seen_[i] = seen_[used - 1];
-  isHidden_ = seen_[used - 1] <= scene_.cutoff;
+  std::fill(seen_ + used, seen_ + kBlock, 0.0f);
+  return used;
 }
 
 template <int kColours>

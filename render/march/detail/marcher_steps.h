@@ -20,11 +20,10 @@ namespace nephele::HWY_NAMESPACE {
 template <int kColours>
 inline bool Marcher<kColours>::flush() {
   const Lanes d;
-  // Of whole vectors.
-  const int used = count_, end = (used + kLanes - 1) / kLanes * kLanes;
+  const auto ofWholeVectors = [](int n) { return (n + kLanes - 1) / kLanes * kLanes; };
+  int used = count_, end = ofWholeVectors(used);
   if (used != end) repeatLast();
   count_ = 0;
-  result_.samples += unsigned(used);
   // Optical depths of the steps, and behind them.
   alignas(64) float own[kBlock], after[kBlock];
   Places places[kBlock / kLanes];
@@ -35,7 +34,10 @@ inline bool Marcher<kColours>::flush() {
   if (std::exchange(someKnown_, false)) takeKnown(end, needsLookUp, own);
   Floats most = hn::Zero(d);
   for (int i = 0; i != end; i += kLanes) most = hn::Max(most, hn::Load(d, own + i));
-  if (!scene_.glows() && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return true;
+  if (!scene_.glows() && hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) {
+    result_.samples += unsigned(used);
+    return true;
+  }
   const float before = depth_;
   Floats behind = hn::Set(d, depth_);
   for (int i = 0; i != end; i += kLanes) {
@@ -46,13 +48,18 @@ inline bool Marcher<kColours>::flush() {
     hn::Store(depth, d, own + i);
     hn::Store(sums, d, after + i);
   }
-  depth_ = hn::GetLane(behind);
+  const bool isOpaque = hn::GetLane(behind) >= opaque_;
+  if (isOpaque)
+    used = int(std::find_if(after, after + used, [&](float a) { return a >= opaque_; }) - after) + 1;
+  if (isHeld_) used = hold(before, after, used);
+  end = ofWholeVectors(used);
+  depth_ = after[used - 1];
+  result_.samples += unsigned(used);
   if (!isHeld_ && before <= detail::kVisibleDepth && depth_ > detail::kVisibleDepth) {
     int first = 0;
     while (after[first] <= detail::kVisibleDepth) ++first;
     result_.distance = ray_.start + s_[first];
   }
-  if (isHeld_) hold(before, after, used);
   if (record_) record(before, after, used);
 
   for (int i = 0; i != end; i += kLanes) {
@@ -69,7 +76,7 @@ inline bool Marcher<kColours>::flush() {
       if (lit_.full()) light(lit_.take());
     }
   }
-  return *std::max_element(through_, through_ + kColours) > scene_.cutoff;
+  return !isOpaque && !(isHeld_ && seen_[used - 1] <= scene_.cutoff);
 }
 
 template <int kColours>

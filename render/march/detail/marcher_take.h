@@ -67,7 +67,7 @@ HWY_INLINE bool Marcher<kColours>::takeAll(int count, float density, StepsOf&& s
     }
     count_ += taken;
     done += taken;
-    if (count_ == together_ && (!flush() || isHidden_)) return false;
+    if (count_ == together_ && !flush()) return false;
   }
   return true;
 }
@@ -84,7 +84,7 @@ inline bool Marcher<kColours>::take(const MarchStep& step) {
     colours_[c][count_] = step.colour[c];
     glows_[c][count_] = step.glow[c];
   }
-  return ++count_ != together_ || (flush() && !isHidden_);
+  return ++count_ != together_ || flush();
 }
 
 }  // namespace nephele::HWY_NAMESPACE
