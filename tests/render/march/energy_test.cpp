@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include "nephele/render/light/scattered_light.h"
 #include "nephele/render/march/raymarch.h"
@@ -26,6 +28,35 @@ TEST(Energy, WhatTheSunSendsInComesOut) {
     const double share = test::shareThatComesOut(lit, towards, {{}, 2.6f, 40}, 6);
     EXPECT_NEAR(share, 1, 0.01) << depth;
   }
+}
+
+// A ball with bumps and an edge a tenth of its radius wide.
+RenderVolume bumpy(int voxelsPerRadius) {
+  const int n = voxelsPerRadius * 13 / 10 + 2;
+  return RenderVolume(test::densityGrid(
+      test::voxels(1.0f / float(voxelsPerRadius)), {-n, -n, -n}, {n, n, n}, [](const Vec3f& p) {
+        const float bumps = 0.15f * std::sin(7 * p.x + 1) * std::sin(6 * p.y) * std::cos(5 * p.z);
+        return std::fmin(std::fmax((1 + bumps - length(p)) / 0.1f + 0.5f, 0.0f), 1.0f);
+      }));
+}
+
+TEST(Energy, TheSameCloudIsAsBrightAtAnyResolution) {
+  // 128 and 256 voxels across, a free path deep and half of one.
+  const auto meanOf = [](const RenderVolume& volume, float g, float azimuth) {
+    const Medium medium{50, {0.999f, 0.999f, 0.999f}, Phase::henyeyGreenstein(g)};
+    const Lights lights{{{"sun", {std::sin(azimuth), 0.6f, std::cos(azimuth)}, {1, 1, 1}}},
+                        {0.1f, 0.1f, 0.1f}};
+    constexpr int pixels = 60;
+    const Camera camera =
+        Camera::lookingAt({0, 0.5f, 6}, {}, {0, 1, 0}, {.width = pixels, .height = pixels, .fovDegrees = 26});
+    const Image image = renderImage(volume, medium, lights, camera, {}).image;
+    const std::vector<float>& red = image.channel("R").values;
+    return std::accumulate(red.begin(), red.end(), 0.0) / (pixels * pixels);
+  };
+  const RenderVolume coarse = bumpy(50), fine = bumpy(100);
+  for (const float g : {0.3f, 0.85f})
+    for (const float azimuth : {0.5f, 2.0f, 3.0f})
+      EXPECT_NEAR(meanOf(coarse, g, azimuth) / meanOf(fine, g, azimuth), 1, 0.02) << g << " " << azimuth;
 }
 
 // A cloud, or its mirror image where `side` is -1. Voxels and bricks lie as far to the left of x = 0 as to
