@@ -8,9 +8,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <thread>
 
 #include "apps/file_hashes.h"
 #include "apps/look/controls.h"
+#include "apps/look/engine.h"
+#include "apps/look/exports.h"
+#include "apps/look/jobs.h"
 #include "apps/look/page_files.inc"
 #include "apps/look/requests.h"
 
@@ -75,46 +82,84 @@ void sendFile(const std::string& name, httplib::Response& response) {
   response.status = 404;
 }
 
-}  // namespace
+class HttpServer final : public LookServer {
+ public:
+  explicit HttpServer(const LookServerOptions& options);
+  ~HttpServer() override;
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
 
-LookServer::LookServer(const LookServerOptions& options)
+  const std::string& address() const override { return address_; }
+  int port() const override { return port_; }
+  void changed(const std::vector<std::string>& paths) override;
+  std::vector<std::string> watched() const override;
+
+ private:
+  using Handler = nlohmann::json (HttpServer::*)(const nlohmann::json&);
+
+  void route();
+  void answer(const std::string& name, Handler handler);
+  bool isFromHere(const httplib::Request& request) const;
+  void stream(const httplib::Request& request, httplib::Response& response);
+  nlohmann::json controls() const;
+  LookExports exportsOf(const nlohmann::json& body) const;
+  nlohmann::json setSettings(const nlohmann::json& body);
+  nlohmann::json makeWedge(const nlohmann::json& body);
+  nlohmann::json commandLines(const nlohmann::json& body);
+  nlohmann::json recipe(const nlohmann::json& body);
+  nlohmann::json saveLook(const nlohmann::json& body);
+  nlohmann::json startJob(const nlohmann::json& body);
+  nlohmann::json stopJob(const nlohmann::json& body);
+
+  LookServerOptions options_;
+  std::string word_, address_;
+  int port_ = 0;
+  LookEngine engine_;
+  LookJobs jobs_;
+  // The last request of each page, to be made again where files change.
+  std::mutex mutex_;
+  std::map<std::string, LookRequest> latest_;
+  httplib::Server server_;
+  std::thread thread_;
+};
+
+HttpServer::HttpServer(const LookServerOptions& options)
     : options_(options),
       word_(randomWord()),
       engine_(options.memoryLimitBytes),
-      jobs_([this](const nlohmann::json& message) { engine_.tell(message); }),
-      server_(std::make_unique<httplib::Server>()) {
-  server_->new_task_queue = [] { return new httplib::ThreadPool(kMostThreads); };
-  server_->set_payload_max_length(kMostBytes);
-  server_->set_read_timeout(5);
-  server_->set_write_timeout(10);
-  server_->set_keep_alive_timeout(30);
-  server_->set_tcp_nodelay(true);
+      jobs_([this](const nlohmann::json& message) { engine_.tell(message); }) {
+  server_.new_task_queue = [] { return new httplib::ThreadPool(kMostThreads); };
+  server_.set_payload_max_length(kMostBytes);
+  server_.set_read_timeout(5);
+  server_.set_write_timeout(10);
+  server_.set_keep_alive_timeout(30);
+  server_.set_tcp_nodelay(true);
   // Its own choice would let two viewers share a port, and with it each other's pages.
-  server_->set_socket_options([](socket_t socket) {
+  server_.set_socket_options([](socket_t socket) {
     const int yes = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   });
   route();
   for (int i = 0; i < kMostPorts && port_ == 0 && options_.port + i <= 65535; ++i)
-    if (server_->bind_to_port(options_.host, options_.port + i)) port_ = options_.port + i;
+    if (server_.bind_to_port(options_.host, options_.port + i)) port_ = options_.port + i;
   if (port_ == 0)
     throw LookFault("", fmt::format("--port: none from {} on is free on {}", options_.port, options_.host));
   const bool isIpv6 = options_.host.find(':') != std::string::npos;
   address_ =
       fmt::format("http://{}:{}/{}/", isIpv6 ? "[" + options_.host + "]" : options_.host, port_, word_);
-  thread_ = std::thread([this] { server_->listen_after_bind(); });
+  thread_ = std::thread([this] { server_.listen_after_bind(); });
 }
 
-LookServer::~LookServer() {
+HttpServer::~HttpServer() {
   engine_.tell({{"type", "bye"}});
   engine_.closeAll();
-  while (!server_->is_running()) std::this_thread::yield();
-  server_->stop();
+  while (!server_.is_running()) std::this_thread::yield();
+  server_.stop();
   endConnections(port_);
   thread_.join();
 }
 
-bool LookServer::isFromHere(const httplib::Request& request) const {
+bool HttpServer::isFromHere(const httplib::Request& request) const {
   std::string host = request.get_header_value("Host");
   // Without its port, which a tunnel may change.
   if (const std::size_t colon = host.rfind(':');
@@ -127,8 +172,8 @@ bool LookServer::isFromHere(const httplib::Request& request) const {
   return request.method == "GET" || origin.empty() || origin == "http://" + request.get_header_value("Host");
 }
 
-void LookServer::route() {
-  server_->set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
+void HttpServer::route() {
+  server_.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Referrer-Policy", "no-referrer");
     response.set_header("Cache-Control", "no-store");
@@ -141,13 +186,12 @@ void LookServer::route() {
     sendJson(errorOf(Error("not from this page")), response);
     return httplib::Server::HandlerResponse::Handled;
   });
-  server_->set_exception_handler(
-      [](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
-        response.status = 500;
-        sendJson(errorOf(Error("the request could not be answered")), response);
-      });
+  server_.set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+    response.status = 500;
+    sendJson(errorOf(Error("the request could not be answered")), response);
+  });
   const std::string base = "/" + word_ + "/";
-  server_->Get(
+  server_.Get(
       base + "([a-z_]*\\.?[a-z]*)", [this](const httplib::Request& request, httplib::Response& response) {
         const std::string name = request.matches[1].length() ? request.matches[1].str() : "index.html";
         if (name == "controls") {
@@ -168,39 +212,39 @@ void LookServer::route() {
         }
         sendFile(name, response);
       });
-  server_->Get(base + "(look/[a-z-]+\\.jpg)",
-               [](const httplib::Request& request, httplib::Response& response) {
-                 sendFile(request.matches[1].str(), response);
+  server_.Get(base + "(look/[a-z-]+\\.jpg)",
+              [](const httplib::Request& request, httplib::Response& response) {
+                sendFile(request.matches[1].str(), response);
+              });
+  answer("settings", &HttpServer::setSettings);
+  answer("wedge", &HttpServer::makeWedge);
+  answer("command", &HttpServer::commandLines);
+  answer("recipe", &HttpServer::recipe);
+  answer("save-look", &HttpServer::saveLook);
+  answer("job", &HttpServer::startJob);
+  answer("stop", &HttpServer::stopJob);
+}
+
+void HttpServer::answer(const std::string& name, Handler handler) {
+  server_.Post("/" + word_ + "/" + name,
+               [this, handler](const httplib::Request& request, httplib::Response& response) {
+                 nlohmann::json result;
+                 try {
+                   const nlohmann::json body = nlohmann::json::parse(request.body, nullptr, false);
+                   if (!body.is_object()) throw LookFault("", "the body must be a JSON object");
+                   result = (this->*handler)(body);
+                 } catch (const nlohmann::json::exception&) {
+                   response.status = 400;
+                   result = errorOf(LookFault("", "the body has values of other types than it should"));
+                 } catch (const std::exception& error) {
+                   response.status = 422;
+                   result = errorOf(error);
+                 }
+                 sendJson(result, response);
                });
-  answer("settings", &LookServer::setSettings);
-  answer("wedge", &LookServer::makeWedge);
-  answer("command", &LookServer::commandLines);
-  answer("recipe", &LookServer::recipe);
-  answer("save-look", &LookServer::saveLook);
-  answer("job", &LookServer::startJob);
-  answer("stop", &LookServer::stopJob);
 }
 
-void LookServer::answer(const std::string& name, Handler handler) {
-  server_->Post("/" + word_ + "/" + name,
-                [this, handler](const httplib::Request& request, httplib::Response& response) {
-                  nlohmann::json result;
-                  try {
-                    const nlohmann::json body = nlohmann::json::parse(request.body, nullptr, false);
-                    if (!body.is_object()) throw LookFault("", "the body must be a JSON object");
-                    result = (this->*handler)(body);
-                  } catch (const nlohmann::json::exception&) {
-                    response.status = 400;
-                    result = errorOf(LookFault("", "the body has values of other types than it should"));
-                  } catch (const std::exception& error) {
-                    response.status = 422;
-                    result = errorOf(error);
-                  }
-                  sendJson(result, response);
-                });
-}
-
-void LookServer::stream(const httplib::Request& request, httplib::Response& response) {
+void HttpServer::stream(const httplib::Request& request, httplib::Response& response) {
   const std::string name = request.get_param_value("page");
   const std::shared_ptr<LookPage> page = isPageName(name) ? engine_.open(name) : nullptr;
   if (!page) {
@@ -222,7 +266,7 @@ void LookServer::stream(const httplib::Request& request, httplib::Response& resp
       [this, name, page](bool) { engine_.close(name, page); });
 }
 
-nlohmann::json LookServer::controls() const {
+nlohmann::json HttpServer::controls() const {
   const LookSubject& subject = options_.subject;
   auto views = nlohmann::json::array();
   for (const LookShow::What what : subject.views()) views.push_back(LookShow::word(what));
@@ -239,7 +283,7 @@ nlohmann::json LookServer::controls() const {
           {"saved", savedLooks()}};
 }
 
-nlohmann::json LookServer::setSettings(const nlohmann::json& body) {
+nlohmann::json HttpServer::setSettings(const nlohmann::json& body) {
   LookRequest request = requestOf(options_.subject, body);
   const std::int64_t revision = request.revision;
   {
@@ -251,25 +295,25 @@ nlohmann::json LookServer::setSettings(const nlohmann::json& body) {
   return {{"revision", revision}};
 }
 
-nlohmann::json LookServer::makeWedge(const nlohmann::json& body) {
+nlohmann::json HttpServer::makeWedge(const nlohmann::json& body) {
   LookWedge wedge = wedgeOf(options_.subject, body);
   const std::size_t count = wedge.cells.size();
   engine_.ask(std::move(wedge));
   return {{"count", count}};
 }
 
-LookExports LookServer::exportsOf(const nlohmann::json& body) const {
+LookExports HttpServer::exportsOf(const nlohmann::json& body) const {
   const auto plan = planOf(options_.subject, body);
   LookExports exports{options_.subject, plan->settings, plan->what};
   readSize(body, exports.width, exports.height);
   return exports;
 }
 
-nlohmann::json LookServer::commandLines(const nlohmann::json& body) {
+nlohmann::json HttpServer::commandLines(const nlohmann::json& body) {
   return {{"lines", exportsOf(body).typed()}};
 }
 
-nlohmann::json LookServer::recipe(const nlohmann::json& body) {
+nlohmann::json HttpServer::recipe(const nlohmann::json& body) {
   const LookExports exports = exportsOf(body);
   if (options_.subject.kind == LookSubject::Kind::script)
     return {{"name", std::filesystem::path(options_.subject.path).filename().string()},
@@ -277,12 +321,12 @@ nlohmann::json LookServer::recipe(const nlohmann::json& body) {
   return {{"name", "cloud.toml"}, {"text", exports.recipe()}};
 }
 
-nlohmann::json LookServer::saveLook(const nlohmann::json& body) {
+nlohmann::json HttpServer::saveLook(const nlohmann::json& body) {
   apps::saveLook(body.value("name", ""), planOf(options_.subject, body)->settings);
   return {{"saved", savedLooks()}};
 }
 
-nlohmann::json LookServer::startJob(const nlohmann::json& body) {
+nlohmann::json HttpServer::startJob(const nlohmann::json& body) {
   const LookExports exports = exportsOf(body);
   const std::string what = body.value("what", ""), file = body.value("file", "");
   const std::map<std::string, std::vector<std::string>> endings{
@@ -324,11 +368,11 @@ nlohmann::json LookServer::startJob(const nlohmann::json& body) {
   return {{"id", jobs_.start(what, std::move(lines), std::move(temporary))}};
 }
 
-nlohmann::json LookServer::stopJob(const nlohmann::json& body) {
+nlohmann::json HttpServer::stopJob(const nlohmann::json& body) {
   return {{"stopped", jobs_.stop(body.value("id", 0))}};
 }
 
-std::vector<std::string> LookServer::watched() const {
+std::vector<std::string> HttpServer::watched() const {
   std::vector<std::string> files;
   for (const std::string* path : {&options_.subject.path, &options_.subject.reference})
     if (!path->empty()) files.push_back(*path);
@@ -339,7 +383,7 @@ std::vector<std::string> LookServer::watched() const {
   return files;
 }
 
-void LookServer::changed(const std::vector<std::string>& paths) {
+void HttpServer::changed(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
     const bool isGone = fileStamp(path).empty();
     nlohmann::json message = {
@@ -367,6 +411,12 @@ void LookServer::changed(const std::vector<std::string>& paths) {
     } catch (const std::exception& error) {
       engine_.tell({{"type", "file"}, {"path", paths.front()}, {"state", "bad"}, {"message", error.what()}});
     }
+}
+
+}  // namespace
+
+std::unique_ptr<LookServer> makeLookServer(const LookServerOptions& options) {
+  return std::make_unique<HttpServer>(options);
 }
 
 }  // namespace nephele::apps

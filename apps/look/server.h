@@ -1,22 +1,11 @@
 #pragma once
 
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
+#include <vector>
 
-#include "apps/look/engine.h"
-#include "apps/look/exports.h"
-#include "apps/look/jobs.h"
 #include "apps/look/settings.h"
 #include "apps/look/subject.h"
-
-namespace httplib {
-class Server;
-struct Request;
-struct Response;
-}  // namespace httplib
 
 namespace nephele::apps {
 
@@ -42,48 +31,22 @@ struct LookServerOptions {
 /// other page of the browser can reach it.
 class LookServer {
  public:
-  /// Listens from here on. @throws Error if no port from `port` on is free.
-  explicit LookServer(const LookServerOptions& options);
   /// Says farewell to all pages and ends all work.
-  ~LookServer();
-  LookServer(const LookServer&) = delete;
-  LookServer& operator=(const LookServer&) = delete;
+  virtual ~LookServer() = default;
 
   /// "http://127.0.0.1:8080/WORD/"
-  const std::string& address() const { return address_; }
-  int port() const { return port_; }
+  virtual const std::string& address() const = 0;
+  virtual int port() const = 0;
   /// Files that pictures are made of have changed.
-  void changed(const std::vector<std::string>& paths);
+  virtual void changed(const std::vector<std::string>& paths) = 0;
   /// Files that pictures are made of.
-  std::vector<std::string> watched() const;
-
- private:
-  using Handler = nlohmann::json (LookServer::*)(const nlohmann::json&);
-
-  void route();
-  void answer(const std::string& name, Handler handler);
-  bool isFromHere(const httplib::Request& request) const;
-  void stream(const httplib::Request& request, httplib::Response& response);
-  nlohmann::json controls() const;
-  LookExports exportsOf(const nlohmann::json& body) const;
-  nlohmann::json setSettings(const nlohmann::json& body);
-  nlohmann::json makeWedge(const nlohmann::json& body);
-  nlohmann::json commandLines(const nlohmann::json& body);
-  nlohmann::json recipe(const nlohmann::json& body);
-  nlohmann::json saveLook(const nlohmann::json& body);
-  nlohmann::json startJob(const nlohmann::json& body);
-  nlohmann::json stopJob(const nlohmann::json& body);
-
-  LookServerOptions options_;
-  std::string word_, address_;
-  int port_ = 0;
-  LookEngine engine_;
-  LookJobs jobs_;
-  // The last request of each page, to be made again where files change.
-  std::mutex mutex_;
-  std::map<std::string, LookRequest> latest_;
-  std::unique_ptr<httplib::Server> server_;
-  std::thread thread_;
+  virtual std::vector<std::string> watched() const = 0;
 };
+
+/// Listens from here on. @throws Error if no port from `port` on is free.
+///
+/// Of the program, a module has it (module.cpp) that is loaded when it is first called (loader.cpp), as the
+/// library that speaks HTTP takes a sixth of the time in which the program starts.
+std::unique_ptr<LookServer> makeLookServer(const LookServerOptions& options);
 
 }  // namespace nephele::apps

@@ -1,45 +1,18 @@
-#include <dlfcn.h>
-#include <fmt/format.h>
-
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
+#include "apps/detail/program_module.h"
 #include "apps/openvdb/functions.h"
-#include "nephele/modeling/base/error.h"
 
 namespace nephele {
 namespace {
 
-// Beside the program where it was built; where it is installed, among the libraries.
-std::string pathOfModule() {
-  std::error_code ignored;
-  const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path(),
-                              beside = folder / NEPHELE_OPENVDB_MODULE;
-  if (std::filesystem::exists(beside, ignored)) return beside.string();
-  return (folder / NEPHELE_MODULES_FROM_PROGRAM / NEPHELE_OPENVDB_MODULE).lexically_normal().string();
-}
-
-// Of the module's libraries first what they need themselves: else each of those symbols is looked for in some
-// sixty libraries of the program before. Sanitizers do not allow it.
-#ifdef NEPHELE_SANITIZED
-constexpr int kBinding = RTLD_NOW | RTLD_LOCAL;
-#else
-constexpr int kBinding = RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND;
-#endif
-
 const apps::OpenVdbFunctions& functions() {
   static const apps::OpenVdbFunctions& loaded = []() -> const apps::OpenVdbFunctions& {
-    void* const module = dlopen(pathOfModule().c_str(), kBinding);
-    const void* const found = module ? dlsym(module, "nepheleOpenVdbFunctions") : nullptr;
-    if (!found)
-      throw Error(fmt::format("the part of the program that knows VDB cannot be loaded, install it again: {}",
-                              dlerror()));
-    const auto& exported = *static_cast<const apps::OpenVdbFunctions*>(found);
+    constexpr char kModule[] = "nephele-openvdb.so", kKnows[] = "VDB";
+    const auto& exported = *static_cast<const apps::OpenVdbFunctions*>(
+        apps::exportedByModule(kModule, "nepheleOpenVdbFunctions", kKnows));
     if (exported.layout != apps::OpenVdbLayout{.functions = sizeof(apps::OpenVdbFunctions)})
-      throw Error(
-          fmt::format("the part of the program that knows VDB is another version's, install it again: {}",
-                      pathOfModule()));
+      apps::refuseModule(kModule, kKnows);
     return exported;
   }();
   return loaded;

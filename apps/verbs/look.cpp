@@ -66,21 +66,21 @@ void look(const LookArguments& options, Run& run) {
   server.folder = options.folder;
   server.memoryLimitBytes = run.memoryLimitBytes;
   server.version = NEPHELE_VERSION;
-  LookServer page(server);
-  if (page.port() != options.port)
-    run.note(fmt::format("port {} is taken; listening on {}", options.port, page.port()));
+  const std::unique_ptr<LookServer> page = makeLookServer(server);
+  if (page->port() != options.port)
+    run.note(fmt::format("port {} is taken; listening on {}", options.port, page->port()));
   if (options.host != "127.0.0.1" && options.host != "localhost" && options.host != "::1")
     run.note("warning: anybody in the network who knows the address can look, and write files into " +
              options.folder);
-  run.result(page.address());
+  run.result(page->address());
   std::fflush(stdout);
-  if (!options.hasNoBrowser) openBrowser(page.address());
+  if (!options.hasNoBrowser) openBrowser(page->address());
   FilesWatch files;
-  files.watch(page.watched());
+  files.watch(page->watched());
   constexpr int kBetweenLooks = 100;
   while (!run.cancelled())
     if (const std::vector<std::string> changed = files.wait(kBetweenLooks); !changed.empty())
-      page.changed(changed);
+      page->changed(changed);
 }
 
 }  // namespace
