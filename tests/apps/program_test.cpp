@@ -157,6 +157,21 @@ TEST(Program, InterruptLeavesNoPartialFileAndSaysSo) {
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(Program, SaysSoWhereTheSystemHasNoMoreMemory) {
+  const TemporaryFolder folder;
+  for (const std::string verb : {"levelset", "cloud"}) {
+    const ProgramResult result =
+        runProgram(verb + " " + kMesh + " --resolution 3000 --memory-limit 64G -o " + folder.file("out.vdb"),
+                   "ulimit -v 600000;");
+    EXPECT_EQ(result.exitCode, 1) << verb;
+    EXPECT_NE(result.errors.find("out of memory; lower --memory-limit or the resolution"), std::string::npos)
+        << result.errors;
+    EXPECT_EQ(folder.entryCount(), 0u);
+  }
+}
+#endif
+
 TEST(Program, RefusesWorkOverTheMemoryLimitBeforeDoingIt) {
   const TemporaryFolder folder;
   for (const std::string verb : {"levelset", "cloud"}) {
