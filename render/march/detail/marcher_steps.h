@@ -9,7 +9,6 @@
 
 #include <hwy/highway.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "nephele/render/march/detail/marcher.h"
@@ -49,8 +48,9 @@ inline bool Marcher<kColours>::flush() {
     hn::Store(sums, d, after + i);
   }
   const bool isOpaque = hn::GetLane(behind) >= opaque_;
-  if (isOpaque)
-    used = int(std::find_if(after, after + used, [&](float a) { return a >= opaque_; }) - after) + 1;
+  // The sum of whole vectors may round up over the limit where that of no step does.
+  for (int i = 0; isOpaque && i != used; ++i)
+    if (after[i] >= opaque_) used = i + 1;
   if (isHeld_) used = hold(before, after, used);
   end = ofWholeVectors(used);
   depth_ = after[used - 1];
