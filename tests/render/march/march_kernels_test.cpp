@@ -146,6 +146,21 @@ TEST(HoldoutCurve, SeesItsShareOfAMediumInTheSamePlace) {
     }
 }
 
+// Parallel rays across the ball of radius 1 about the origin, side by side.
+std::vector<MarchRay> raysAcross(const BrickGrid& grid, const LightVolume& light, int count) {
+  std::vector<MarchRay> rays;
+  for (int i = 0; i != count; ++i) {
+    MarchRay& ray = rays.emplace_back();
+    const Vec3f origin{-0.9f + 1.8f / float(count) * float(i), 0.1f, 2}, direction{0, 0, -1};
+    ray.density = through(grid.worldToIndex(), grid.firstBrick(), origin, direction);
+    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, direction);
+    ray.start = 7;
+    ray.length = 4;
+    ray.weight[0][0][0] = 1;
+  }
+  return rays;
+}
+
 TEST(MarchKernels, EndWithTheStepBehindWhichNothingIsSeenWithRecordsAndWithout) {
   const auto grid = test::ball(1.0f, 0.1f);
   const RenderVolume volume(grid);
@@ -153,17 +168,10 @@ TEST(MarchKernels, EndWithTheStepBehindWhichNothingIsSeenWithRecordsAndWithout) 
   MarchScene scene = test::sceneOf(volume, sun);
   scene.step = 0.01f;
   const HoldoutCurve::Knot thin[] = {{8.5f, 0}, {9.0f, 0.4f}}, wall[] = {{8.6f, 0}, {8.6f, 30}};
-  std::vector<MarchRay> rays;
-  for (int i = 0; i != 60; ++i) {
-    MarchRay& ray = rays.emplace_back();
-    const Vec3f origin{-0.9f + 0.03f * float(i), 0.1f, 2};
-    ray.density = through(grid->worldToIndex(), grid->firstBrick(), origin, {0, 0, -1});
-    ray.suns[0] = through(sun.light.worldToLattice(), sun.light.firstBrick(), origin, {0, 0, -1});
-    ray.start = 7;
-    ray.length = 4;
-    ray.weight[0][0][0] = 1;
-    if (i % 3 == 1) ray.holdout = {thin, std::size(thin)};
-    if (i % 3 == 2) ray.holdout = {wall, std::size(wall)};
+  std::vector<MarchRay> rays = raysAcross(*grid, sun.light, 60);
+  for (std::size_t i = 0; i != rays.size(); ++i) {
+    if (i % 3 == 1) rays[i].holdout = {thin, std::size(thin)};
+    if (i % 3 == 2) rays[i].holdout = {wall, std::size(wall)};
   }
   for (const float extinction : {0.5f, 8.0f, 20.0f, 400.0f}) {
     scene.extinction = extinction;
@@ -194,23 +202,12 @@ TEST(MarchKernels, HoldOutAndRecordAsTheScalarLoopDoes) {
   const auto grid = test::ball(1.0f, 0.1f);
   const RenderVolume volume(grid);
   const test::SunColumns sun({volume, {0, 0, 1}});
-  const LightVolume& light = sun.light;
   MarchScene scene = test::sceneOf(volume, sun);
   scene.extinction = 1.5f;
   scene.step = 0.05f;
   const HoldoutCurve::Knot knots[] = {{8.5f, 0}, {9.0f, 0.4f}, {9.0f, 0.9f}, {9.3f, 1.0f}};
-  std::vector<MarchRay> rays;
-  for (int i = 0; i != 40; ++i) {
-    MarchRay ray{};
-    const Vec3f origin{-0.9f + 0.045f * float(i), 0.1f, 2};
-    ray.density = through(grid->worldToIndex(), grid->firstBrick(), origin, {0, 0, -1});
-    ray.suns[0] = through(light.worldToLattice(), light.firstBrick(), origin, {0, 0, -1});
-    ray.start = 7;
-    ray.length = 4;
-    ray.weight[0][0][0] = 1;
-    if (i % 2 == 0) ray.holdout = {knots, std::size(knots)};
-    rays.push_back(ray);
-  }
+  std::vector<MarchRay> rays = raysAcross(*grid, sun.light, 40);
+  for (std::size_t i = 0; i < rays.size(); i += 2) rays[i].holdout = {knots, std::size(knots)};
   std::vector<MarchResult> expected(rays.size());
   test::marchRaysScalar(scene, rays, expected);
   test::forEachTarget([&] {
