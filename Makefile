@@ -14,7 +14,7 @@ STRICT := OFF
 SECONDS := 60
 FORMATS :=
 
-.PHONY: all deps build demo examples test test-sanitized fuzz test-farm test-look bench docs format lint install package clean
+.PHONY: all deps fuzz-deps build demo examples test test-sanitized fuzz test-farm test-look bench docs format lint install package clean
 
 all: build
 
@@ -40,19 +40,26 @@ test: deps
 	sh tests/check_includes.sh
 	ctest --test-dir build --output-on-failure --parallel 2
 
-# The tests of grids, meshes and files once more, under AddressSanitizer and UndefinedBehaviorSanitizer.
-test-sanitized: deps
-	cmake --preset asan -DNEPHELE_BUILD_APPS=OFF -DNEPHELE_BUILD_TESTS=ON
-	cmake --build build-asan --target nephele_grids_tests
-	LSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/lsan_suppressions.txt \
-	  build-asan/bin/nephele_grids_tests --gtest_brief=1
-
-# Every reader of files with inputs that clang's libFuzzer makes up; docs/limits.md says what came of it.
-fuzz: deps
+fuzz-deps: deps
 	@dpkg -s $(FUZZ_PACKAGES) >/dev/null 2>&1 || \
 	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $(FUZZ_PACKAGES)
+
+# Of hundreds of thousands of leaves, of many millions of letters: nothing that smaller tests do not reach.
+SLOW_TESTS := *.WallsThatMarchingCubesWouldLoseAreRefused:*.AWrapIsCoarserWhereAFinerOneWouldEnterHoles:$\
+  *.RefusesToWriteTextsThatAreTooLongToBeRead
+
+# The tests of grids, meshes and files once more, under AddressSanitizer and UndefinedBehaviorSanitizer, with the libraries of
+# the fuzzers: building them takes far longer than the tests.
+test-sanitized: fuzz-deps
 	cmake --preset fuzz
-	cmake --build build-fuzz --target nephele_fuzz
+	cmake --build build-fuzz --target nephele_grids_tests
+	seq 0 1 | LSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/lsan_suppressions.txt GTEST_TOTAL_SHARDS=2 \
+	  xargs -P 2 -I{} env GTEST_SHARD_INDEX={} build-fuzz/bin/nephele_grids_tests --gtest_brief=1 --gtest_filter='-$(SLOW_TESTS)'
+
+# Every reader of files with inputs that clang's libFuzzer makes up; docs/limits.md says what came of it.
+fuzz: fuzz-deps
+	cmake --preset fuzz
+	cmake --build build-fuzz --target nephele_fuzz nephele_fuzz_seeds
 	sh tests/fuzz/run.sh build-fuzz/bin/nephele_fuzz build-fuzz/fuzz $(SECONDS) $(FORMATS)
 
 # The page of `nephele look` in a browser, with BROWSER=firefox in that one; what was seen is kept in

@@ -43,7 +43,7 @@ if module=$(find "$prefix" -name '_nephele*.so' | grep .); then
   PYTHONPATH=$(dirname "$(dirname "$module")") /usr/bin/python3 -c 'import nephele; assert nephele.sphere((0, 0, 0), 1)((0, 0, 0)) == 1'
 fi
 
-configure subfolder -DNEPHELE_ALL_PARTS=OFF -DNEPHELE_SUBFOLDER="$root" -DNEPHELE_PARTS=modeling -DBUILD_SHARED_LIBS=ON
+configure subfolder -DNEPHELE_ALL_PARTS=OFF -DNEPHELE_SUBFOLDER="$root" -DNEPHELE_PARTS=modeling -DBUILD_SHARED_LIBS=ON -DCMAKE_BUILD_TYPE=Debug
 if asksForMore "$folder/subfolder"; then fail "the mathematics alone asks for libraries that it does not use"; fi
 quietly cmake --build "$folder/subfolder" --target fields
 "$folder/subfolder/fields"

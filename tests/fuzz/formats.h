@@ -37,9 +37,6 @@ struct Format {
 
 std::span<const Format> formats();
 
-/// Writes small files of every format into `folder`/`name of the format`.
-void writeSeeds(const std::string& folder);
-
 void useMesh(const Input& input);
 void useVolume(const Input& input);
 void usePicture(const Input& input);

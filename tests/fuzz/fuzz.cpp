@@ -1,6 +1,6 @@
-// One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`. It writes files to
-// begin from, `--write-seeds=FOLDER`, and changes of them that are the same every time,
-// `--format=obj --write-inputs=FOLDER --seeds=FOLDER --count=300`.
+// One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`. Of files to begin
+// from it writes changes that are the same every time, `--format=obj --write-inputs=FOLDER --seeds=FOLDER
+// --count=300`.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -74,9 +74,6 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     const std::string_view argument = (*argv)[i];
     if (argument.starts_with("--format=")) {
       chosen = formatCalled(argument.substr(9));
-    } else if (argument.starts_with("--write-seeds=")) {
-      writeSeeds(std::string(argument.substr(14)));
-      std::exit(0);
     } else if (argument.starts_with("--write-inputs=")) {
       inputs = argument.substr(15);
     } else if (argument.starts_with("--seeds=")) {
@@ -90,7 +87,7 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   if (!chosen) {
     std::string names;
     for (const Format& format : kFormats) names += fmt::format("{}{}", names.empty() ? "" : "|", format.name);
-    std::fprintf(stderr, "nephele_fuzz: --format=%s, or --write-seeds=FOLDER\n", names.c_str());
+    std::fprintf(stderr, "nephele_fuzz: --format=%s\n", names.c_str());
     std::exit(2);
   }
   if (!inputs.empty()) {

@@ -1,5 +1,5 @@
 #!/bin/sh
-# run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
+# run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes, from what PROGRAM_seeds beside it writes, each format for so long, as many at once as there are processors, and says
 # how many inputs it ran. What it learns stays in FOLDER/corpus and is where the next run begins; inputs that broke something
 # are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds of a processor, inputs, findings.
 # FUZZ_FILES: further files to begin from, folders of files that are sorted by their extensions.
@@ -13,7 +13,7 @@ folder=$(cd "$folder" && pwd)
 [ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera ocio toml field felt calls
 
 rm -rf "$folder/seeds"
-"$program" --write-seeds="$folder/seeds"
+"${program}_seeds" "$folder/seeds"
 # Larger files make every run slow and teach nothing that small ones do not.
 most=16k
 for files in "$here/../../data" ${FUZZ_FILES:-}; do

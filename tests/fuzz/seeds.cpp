@@ -1,5 +1,6 @@
-// Small files of every format, to begin from: written by the library and, where a format can do more than the
-// library writes, by the libraries that it reads with.
+// `nephele_fuzz_seeds FOLDER` writes small files of every format into FOLDER/NAME-OF-THE-FORMAT, to begin
+// from: by the library and, where a format can do more than the library writes, by the libraries that it
+// reads with.
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
 #include <OpenEXR/ImfChannelList.h>
@@ -15,6 +16,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/points/PointConversion.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -27,7 +29,6 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
-#include "tests/fuzz/formats.h"
 
 namespace nephele::fuzz {
 namespace {
@@ -459,8 +460,15 @@ void writeTextSeeds(const std::string& parent) {
 }
 
 }  // namespace
+}  // namespace nephele::fuzz
 
-void writeSeeds(const std::string& folder) {
+int main(int argc, char** argv) {
+  using namespace nephele::fuzz;
+  if (argc != 2) {
+    std::fprintf(stderr, "nephele_fuzz_seeds: one folder is needed\n");
+    return 2;
+  }
+  const std::string folder = argv[1];
   writeMeshSeeds(folder);
   writeVolumeSeeds(folder);
   writePictureSeeds(folder);
@@ -468,5 +476,3 @@ void writeSeeds(const std::string& folder) {
   writeViewConfigSeeds(folder);
   writeTextSeeds(folder);
 }
-
-}  // namespace nephele::fuzz
