@@ -18,6 +18,8 @@ namespace {
 void prepareAllocator() {
 #ifdef NEPHELE_WITH_MIMALLOC
   mi_option_set_enabled_default(mi_option_large_os_pages, true);
+  // Else the first segment of each thread comes in small pages, and short runs need no second one.
+  mi_option_set_default(mi_option_eager_commit_delay, 0);
 #else
   nephele::returnLargeBlocksAtOnce();
 #endif

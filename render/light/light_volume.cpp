@@ -124,33 +124,31 @@ struct LightVolume::Sweep {
       for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
         const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
         const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
-        const bool holds = grid.ranges()[std::size_t(pool)].max > 0;
         float* rows = patch.samples.data() + (v1 - patch.v) * kPitch + (u1 - patch.u);
-        const auto copy = [&, countU = u2 - u1, countV = v2 - v1](const auto& sampleAt) {
-          const int from = insideBrick(u1);
-          if (u != 0)
-            copyRows(from, countU, countV, rows,
-                     [&](int x, int y) { return sampleAt(x * sampleStride[u], y); });
-          else if (coded)
-            copyRows(from, countU, countV, rows,
-                     [&](int x, int y) { return sampleAt(CodedBricks::offsetAlongX(x), y); });
-          else
-            copyRows(from, countU, countV, rows, sampleAt);
+        const int from = insideBrick(u1), countU = u2 - u1, countV = v2 - v1;
+        const auto copy = [=, this](const auto& at) {
+          if (u == 0) return copyRows(from, countU, countV, rows, at);
+          copyRows(from, countU, countV, rows, [&](int x, int y) { return at(x * sampleStride[u], y); });
         };
         const int alongW = w == 0 && coded ? CodedBricks::offsetAlongX(insideBrick(k))
                                            : insideBrick(k) * sampleStride[w],
                   first = alongW + insideBrick(v1) * sampleStride[v];
-        if (!holds) {
+        if (!(grid.ranges()[std::size_t(pool)].max > 0)) {
           copy([](int, int) { return 0.0f; });
         } else if (coded) {
           const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
-          const std::int16_t* from = coded->codes() + entry.first + first;
-          copy([&](int x, int y) {
-            return (float(from[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
-          });
+          const std::int16_t* codes = coded->codes() + entry.first + first;
+          for (int y = 0; u == 0 && y != countV; ++y, rows += kPitch) {
+            const auto row = CodedBricks::rowOf(codes + y * sampleStride[v], entry.unit);
+            std::copy_n(row.data() + from, countU, rows);
+          }
+          if (u != 0)
+            copy([&](int x, int y) {
+              return (float(codes[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
+            });
         } else {
-          const float* from = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
-          copy([&](int x, int y) { return from[x + y * sampleStride[v]]; });
+          const float* samples = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
+          copy([&](int x, int y) { return samples[x + y * sampleStride[v]]; });
         }
         u1 = u2;
       }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -83,11 +85,16 @@ class CodedBricks {
   void decode(std::size_t place, float* nodes) const {
     const Entry entry = entries_[place];
     const std::int16_t* codes = codes_.get() + entry.first;
-    for (int row = 0; row != kWidth * kWidth; ++row, codes += kRow, nodes += kWidth) {
-      for (int x = 0; x != kHalfCells; ++x) nodes[x] = (float(codes[x]) - kZero) * entry.unit;
-      for (int x = 0; x != kHalfCells + 1; ++x)
-        nodes[kHalfCells + x] = (float(codes[kHalf + x]) - kZero) * entry.unit;
-    }
+    for (int row = 0; row != kWidth * kWidth; ++row, codes += kRow)
+      nodes = std::ranges::copy(rowOf(codes, entry.unit), nodes).out;
+  }
+  /// A row, the first node of which is the first of `codes`.
+  static std::array<float, kWidth> rowOf(const std::int16_t* codes, float unit) {
+    std::array<float, kWidth> nodes;
+    for (int x = 0; x != kHalfCells; ++x) nodes[std::size_t(x)] = (float(codes[x]) - kZero) * unit;
+    for (int x = kHalfCells; x != kWidth; ++x)
+      nodes[std::size_t(x)] = (float(codes[offsetAlongX(x)]) - kZero) * unit;
+    return nodes;
   }
 
   /// Copies share their codes.
