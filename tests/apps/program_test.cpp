@@ -235,6 +235,12 @@ TEST(Program, ConfigFilesThatAreNoneAreRefused) {
   const ProgramResult notAFile = runProgram(convert + folder.file("."));
   EXPECT_EQ(notAFile.exitCode, 2);
   EXPECT_NE(notAFile.errors.find("is a folder"), std::string::npos) << notAFile.errors;
+  std::ofstream(folder.file("zero.toml")) << "output = \"a.vdb\\u0000b.vdb\"\n";
+  const ProgramResult zero = runProgram("levelset " + kMesh + " --config " + folder.file("zero.toml"));
+  EXPECT_EQ(zero.exitCode, 2);
+  EXPECT_NE(zero.errors.find("zero.toml:1:10: error: 'output' is a text with a byte of zero"),
+            std::string::npos)
+      << zero.errors;
 }
 
 TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {
