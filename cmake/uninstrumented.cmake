@@ -2,17 +2,17 @@
 #
 # Noises, kernels and light: without sanitizers, with which clang also takes minutes for each of them. Kernels that read grids and
 # meshes keep those of memory.
-set(NEPHELE_UNINSTRUMENTED -fno-sanitize=all
-  -fno-sanitize-coverage=edge,trace-cmp,inline-8bit-counters,pc-table,indirect-calls)
+set(not_followed -fno-sanitize-coverage=edge,trace-cmp,inline-8bit-counters,pc-table,indirect-calls)
+set(NEPHELE_UNINSTRUMENTED -fno-sanitize=all ${not_followed})
 foreach(part IN ITEMS modeling levelset render)
   file(GLOB_RECURSE kernels ${PROJECT_SOURCE_DIR}/${part}/*_kernels.cpp ${PROJECT_SOURCE_DIR}/${part}/noise/*.cpp
     ${PROJECT_SOURCE_DIR}/${part}/light/*.cpp)
-  set(options -O2 ${NEPHELE_UNINSTRUMENTED})
+  set(options ${NEPHELE_UNINSTRUMENTED})
   if(part STREQUAL "levelset")
-    list(TRANSFORM options REPLACE "^-fno-sanitize=all$" "-fno-sanitize=undefined")
+    set(options -fno-sanitize=undefined ${not_followed})
   endif()
   set_source_files_properties(${kernels} TARGET_DIRECTORY nephele_${part} PROPERTIES
-    COMPILE_OPTIONS "${options}" SKIP_PRECOMPILE_HEADERS ON)
+    COMPILE_OPTIONS "-O2;${options}" SKIP_PRECOMPILE_HEADERS ON)
 endforeach()
 # Comparisons are followed where files and options are read: they show which bytes are words of a format.
 foreach(part IN ITEMS modeling levelset render)

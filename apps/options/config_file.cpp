@@ -45,13 +45,7 @@ struct Setting {
 };
 
 Setting::Value valueOf(const TomlFile& file, const std::string& key, const toml::node& node) {
-  if (auto text = node.value_exact<std::string>()) {
-    // Names of files would end there.
-    if (text->find('\0') != text->npos)
-      file.refuse(felt::Code::wrongType, node.source(),
-                  nephele::quoted(key) + " is a text with a byte of zero in it, which no option takes");
-    return {node, *text};
-  }
+  if (auto text = node.value_exact<std::string>()) return {node, *text};
   if (auto whole = node.value_exact<std::int64_t>()) return {node, std::to_string(*whole)};
   if (auto number = node.value_exact<double>()) return {node, fmt::format("{}", *number)};
   file.refuse(felt::Code::wrongType, node.source(),

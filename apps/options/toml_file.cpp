@@ -61,6 +61,22 @@ std::string sentenceOf(const toml::parse_error& error) {
   return std::string(text.starts_with(start) ? text.substr(start.size()) : text);
 }
 
+/// The first text with a byte of zero in it, at which names of files and messages would end; null if there is
+/// none.
+const toml::node* textWithZeroIn(const toml::node& node) {
+  if (const auto* text = node.as_string())
+    return text->get().find('\0') != std::string::npos ? text : nullptr;
+  const toml::node* found = nullptr;
+  const auto look = [&](const toml::node& item) {
+    if (!found) found = textWithZeroIn(item);
+  };
+  if (const toml::array* list = node.as_array())
+    for (const toml::node& item : *list) look(item);
+  if (const toml::table* table = node.as_table())
+    for (const auto& [key, item] : *table) look(item);
+  return found;
+}
+
 }  // namespace
 
 TomlFile TomlFile::read(const std::string& option, const std::string& path) {
@@ -90,6 +106,8 @@ TomlFile::TomlFile(std::string name, std::string text) {
   } catch (const toml::parse_error& error) {
     refuse(felt::Code::expected, error.source(), sentenceOf(error));
   }
+  if (const toml::node* found = textWithZeroIn(table_))
+    refuse(felt::Code::wrongType, found->source(), "a text may not have a byte of zero in it");
 }
 
 std::string TomlFile::placeOf(const toml::node& node) const {

@@ -17,8 +17,8 @@ namespace nephele::apps {
 class TomlFile {
  public:
   /// The whole file that `option` names. @throws CLI::ValidationError naming option and file where it cannot
-  /// be read or is a folder; felt::ScriptError where it is not TOML, or has keys that nest more than 32 deep,
-  /// which toml++ would follow until the stack ends.
+  /// be read or is a folder; felt::ScriptError where it is not TOML, has a text with a byte of zero in it,
+  /// or keys that nest more than 32 deep, which toml++ would follow until the stack ends.
   static TomlFile read(const std::string& option, const std::string& path);
   /// A text that is called `name`. @throws felt::ScriptError as above.
   TomlFile(std::string name, std::string text);

@@ -2,30 +2,23 @@
 // they are used, clang does not.
 #include "nephele/levelset/grid/openvdb_instances.h"
 
-#define NEPHELE_INSTANTIATE_GRID(GridTree)                                                           \
+#define NEPHELE_INSTANTIATE(GridTree)                                                                \
   template openvdb::Grid<openvdb::GridTree>::Grid(const openvdb::GridTree::ValueType&);              \
   template openvdb::GridTree& openvdb::Grid<openvdb::GridTree>::tree();                              \
   template const openvdb::GridTree& openvdb::Grid<openvdb::GridTree>::tree() const;                  \
   template const openvdb::GridTree& openvdb::Grid<openvdb::GridTree>::constTree() const;             \
   template const openvdb::GridTree::ValueType& openvdb::Grid<openvdb::GridTree>::background() const; \
   template openvdb::Grid<openvdb::GridTree>::ConstAccessor                                           \
-  openvdb::Grid<openvdb::GridTree>::getConstAccessor() const;
-
-#define NEPHELE_INSTANTIATE_TREE(GridTree)                                                        \
-  template const openvdb::GridTree::ValueType&                                                    \
-  openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::background() const;                       \
-  template const openvdb::Name& openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::treeType(); \
-  template void openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::getNodeLog2Dims(            \
-      std::vector<openvdb::Index>&);                                                              \
+  openvdb::Grid<openvdb::GridTree>::getConstAccessor() const;                                        \
+  template const openvdb::GridTree::ValueType&                                                       \
+  openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::background() const;                          \
+  template const openvdb::Name& openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::treeType();    \
+  template void openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::getNodeLog2Dims(               \
+      std::vector<openvdb::Index>&);                                                                 \
   template void openvdb::tree::Tree<openvdb::GridTree::RootNodeType>::voxelizeActiveTiles(bool);
 
-NEPHELE_INSTANTIATE_GRID(FloatTree)
-NEPHELE_INSTANTIATE_GRID(DoubleTree)
-NEPHELE_INSTANTIATE_GRID(Int32Tree)
-NEPHELE_INSTANTIATE_GRID(Vec3STree)
-NEPHELE_INSTANTIATE_GRID(Vec3DTree)
-NEPHELE_INSTANTIATE_TREE(FloatTree)
-NEPHELE_INSTANTIATE_TREE(DoubleTree)
-NEPHELE_INSTANTIATE_TREE(Int32Tree)
-NEPHELE_INSTANTIATE_TREE(Vec3STree)
-NEPHELE_INSTANTIATE_TREE(Vec3DTree)
+NEPHELE_INSTANTIATE(FloatTree)
+NEPHELE_INSTANTIATE(DoubleTree)
+NEPHELE_INSTANTIATE(Int32Tree)
+NEPHELE_INSTANTIATE(Vec3STree)
+NEPHELE_INSTANTIATE(Vec3DTree)

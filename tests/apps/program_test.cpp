@@ -238,9 +238,14 @@ TEST(Program, ConfigFilesThatAreNoneAreRefused) {
   std::ofstream(folder.file("zero.toml")) << "output = \"a.vdb\\u0000b.vdb\"\n";
   const ProgramResult zero = runProgram("levelset " + kMesh + " --config " + folder.file("zero.toml"));
   EXPECT_EQ(zero.exitCode, 2);
-  EXPECT_NE(zero.errors.find("zero.toml:1:10: error: 'output' is a text with a byte of zero"),
-            std::string::npos)
+  EXPECT_NE(zero.errors.find("zero.toml:1:10: error: a text may not have a byte of zero"), std::string::npos)
       << zero.errors;
+  std::ofstream(folder.file("recipe.toml")) << "[[layer]]\namplitude = \"a.vdb\\u0000b.vdb\"\n";
+  const ProgramResult recipe = runProgram("cloud " + kMesh + " -o " + folder.file("out.vdb") + " --recipe " +
+                                          folder.file("recipe.toml"));
+  EXPECT_NE(recipe.errors.find("recipe.toml:2:13: error: a text may not have a byte of zero"),
+            std::string::npos)
+      << recipe.errors;
 }
 
 TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {

@@ -1,7 +1,8 @@
 #!/bin/sh
-# run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes, from what PROGRAM_seeds beside it writes, each format for so long, as many at once as there are processors, and says
-# how many inputs it ran. What it learns stays in FOLDER/corpus and is where the next run begins; inputs that broke something
-# are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds of a processor, inputs, findings.
+# run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
+# how many inputs it ran. It begins with what PROGRAM_seeds writes. What it learns stays in FOLDER/corpus and is where the next run
+# begins; inputs that broke something are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds of a
+# processor, inputs, findings.
 # FUZZ_FILES: further files to begin from, folders of files that are sorted by their extensions.
 # SECONDS of 0: the same inputs every time, the files to begin from and our own changes of them; their checksum is said.
 set -eu
