@@ -25,6 +25,7 @@
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele {
 namespace detail {
@@ -57,6 +58,7 @@ std::string readWholeFile(const std::string& path) {
   const auto failed = [&](int error) {
     return Error(fmt::format("{}: cannot be read: {}", path, std::generic_category().message(error)));
   };
+  requireWholeName(path);
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) throw failed(errno);
   const std::unique_ptr<const int, void (*)(const int*)> closer(&descriptor,

@@ -22,6 +22,7 @@
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele {
 namespace {
@@ -104,6 +105,7 @@ bool isStream(const std::string& path) {
 OutputFile::OutputFile(std::string path)
     : path_(std::move(path)), target_(outputTarget(path_)), isStream_(isStream(path_)) {
   require(!path_.empty(), "output: the file name is empty");
+  requireWholeName(path_);
   const fs::path target(isStream_ ? path_ : target_);
   const fs::path folder = isStream_                  ? fs::temp_directory_path()
                           : target.has_parent_path() ? target.parent_path()

@@ -17,6 +17,7 @@
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/printable.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele {
 
@@ -30,6 +31,7 @@ namespace {
 }
 
 void checkReadable(const std::string& path) {
+  requireWholeName(path);
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) failReading(path, "no such file");

@@ -7,10 +7,10 @@ namespace nephele {
 
 /// The one exception type of the library: bad arguments, bad files, work that cannot be done.
 /// The message is a sentence for a person: it names the argument or file, the value found and what is
-/// allowed.
+/// allowed. Bytes of zero, at which `what()` would end, are shown as \x00.
 class Error : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit Error(const std::string& message);
 };
 
 /// Thrown out of long work when its Progress reports that it was cancelled.
@@ -38,7 +38,7 @@ auto namingFile(const std::string& path, const Work& work) {
     throw;
   } catch (const Error& error) {
     const std::string message = error.what();
-    if (message.starts_with(path)) throw;
+    if (message.starts_with(path.c_str())) throw;
     throw Error(path + ": " + message);
   }
 }

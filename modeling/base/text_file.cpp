@@ -10,6 +10,7 @@
 namespace nephele {
 
 std::string readTextFile(const std::string& path, std::size_t mostBytes) {
+  requireWholeName(path);
   std::error_code ignored;
   require(!std::filesystem::is_directory(path, ignored), path + ": is a folder, not a file");
   std::ifstream file(path, std::ios::binary);
@@ -22,6 +23,11 @@ std::string readTextFile(const std::string& path, std::size_t mostBytes) {
   }
   require(file.eof() && !file.bad(), path + ": cannot be read");
   return text;
+}
+
+void requireWholeName(const std::string& path) {
+  require(path.find('\0') == std::string::npos,
+          path + ": the name of a file may not have a byte of zero in it");
 }
 
 }  // namespace nephele

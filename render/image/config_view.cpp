@@ -13,6 +13,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/printable.h"
+#include "nephele/modeling/base/text_file.h"
 #include "nephele/render/image/detail/config_check.h"
 
 namespace nephele {
@@ -121,6 +122,7 @@ std::pair<OCIO::GroupTransformRcPtr, std::string> entrance(const OCIO::ConstConf
 }  // namespace
 
 std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string& view) {
+  requireWholeName(path);
   const Silence silence;
   try {
     // What is no file, or no text that a person could have written, is not for a parser.

@@ -14,6 +14,7 @@
 
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 #include "nephele/render/image/exr_io.h"
 
 namespace nephele {
@@ -31,6 +32,7 @@ void requireSize(const std::string& path, long long width, long long height, lon
 namespace {
 
 void readFile(const std::string& path, const ImageReader& reader) {
+  requireWholeName(path);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file.is_open())

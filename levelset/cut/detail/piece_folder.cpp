@@ -19,6 +19,7 @@
 
 #include "nephele/levelset/cut/piece_files.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele::detail {
 namespace {
@@ -65,6 +66,7 @@ class FolderLock {
 
 PieceFolder::PieceFolder(std::string path) : path_(std::move(path)) {
   require(!path_.empty(), "the name of the folder for pieces is empty");
+  requireWholeName(path_);
   std::error_code error;
   fs::path folder = fs::absolute(path_).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();

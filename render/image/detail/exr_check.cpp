@@ -11,6 +11,7 @@
 
 #include "nephele/levelset/io/file_bytes.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele::detail {
 namespace {
@@ -280,10 +281,9 @@ class Follower {
 
 }  // namespace
 
-ExrCheck checkExr(const std::string& path) try {
-  return Follower(path).follow();
-} catch (const Error& error) {
-  throw Error(fmt::format("{}: {}", path, error.what()));
+ExrCheck checkExr(const std::string& path) {
+  requireWholeName(path);
+  return namingFile(path, [&] { return Follower(path).follow(); });
 }
 
 }  // namespace nephele::detail

@@ -10,6 +10,7 @@
 #include <functional>
 
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/message_of.h"
@@ -209,6 +210,21 @@ TEST(OutputFile, FullDiskFailsTheMeshWritersAndLeavesNothing) {
       EXPECT_EQ(folder.entryCount(), 0u);
     }
   }
+}
+
+TEST(OutputFile, NamesThatWouldEndAtAByteOfZeroAreRefusedByEveryReaderAndWriter) {
+  const TemporaryFolder folder;
+  const std::string fault = "\\x00.obj: the name of a file may not have a byte of zero in it";
+  const auto named = [&](const char* name) { return folder.file(name) + std::string("\0.obj", 5); };
+  Mesh triangle;
+  triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  triangle.addFace(std::vector<std::uint32_t>{0, 1, 2});
+  EXPECT_EQ(messageOf([&] { writeMesh(named("a.obj"), triangle); }), folder.file("a.obj") + fault);
+  EXPECT_EQ(folder.entryCount(), 0u);
+  for (const char* name : {"a.obj", "a.vdb", "a.nvdb"}) std::ofstream(folder.file(name)) << "v 0 0 0\n";
+  EXPECT_EQ(messageOf([&] { readMesh(named("a.obj")); }), folder.file("a.obj") + fault);
+  for (const char* name : {"a.vdb", "a.nvdb"})
+    EXPECT_EQ(messageOf([&] { readVdbFile(named(name)); }), folder.file(name) + fault);
 }
 
 }  // namespace

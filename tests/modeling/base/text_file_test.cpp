@@ -35,5 +35,17 @@ TEST(TextFile, WhatCannotBeReadIsRefused) {
             folder.file(".") + ": is a folder, not a file");
 }
 
+TEST(TextFile, NamesThatWouldEndAtAByteOfZeroAreRefusedAndShownWhole) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.file("a.txt")) << "four";
+  const std::string fault = "the name of a file may not have a byte of zero in it";
+  const std::string name = folder.file("a.txt") + std::string("\0b", 2);
+  EXPECT_EQ(messageOf([&] { readTextFile(name, 9); }), folder.file("a.txt") + "\\x00b: " + fault);
+  EXPECT_EQ(messageOf([&] { namingFile(name, [&] { return readTextFile(name, 9); }); }),
+            folder.file("a.txt") + "\\x00b: " + fault);
+  EXPECT_EQ(messageOf([&] { namingFile(name, []() -> int { throw Error("is odd"); }); }),
+            folder.file("a.txt") + "\\x00b: is odd");
+}
+
 }  // namespace
 }  // namespace nephele

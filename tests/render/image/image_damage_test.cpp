@@ -14,6 +14,7 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
+#include "tests/support/message_of.h"
 #include "tests/support/png_bytes.h"
 #include "tests/support/run_program.h"
 
@@ -218,6 +219,19 @@ TEST(ImageDamage, AnyByteMayBeAnother) {
         EXPECT_EQ(message.find(foreign), std::string::npos) << message;
     }
   }
+}
+
+TEST(ImageDamage, NamesThatWouldEndAtAByteOfZeroAreRefused) {
+  const TemporaryFolder folder;
+  writeExr(folder.file("b.exr"), smallImage(), {}, {});
+  writePng(folder.file("b.png"), smallImage(), {});
+  for (const char* name : {"b.exr", "b.png"}) {
+    const std::string path = folder.file(name);
+    EXPECT_EQ(messageFor(path + std::string("\0b", 2)),
+              path + "\\x00b: the name of a file may not have a byte of zero in it");
+  }
+  EXPECT_EQ(test::messageOf([&] { readDeepExr(folder.file("b.exr") + std::string("\0b", 2)); }),
+            folder.file("b.exr") + "\\x00b: the name of a file may not have a byte of zero in it");
 }
 
 }  // namespace
