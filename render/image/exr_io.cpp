@@ -201,9 +201,14 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
     }
   }
   detail::writeWhole(output, [&](Imf::OStream& stream) {
-    // Parts of the picture are compressed on all cores; OpenEXR's own threads are none until it is told.
-    const int threads = int(threadCount());
-    if (Imf::globalThreadCount() < threads && threads > 1) Imf::setGlobalThreadCount(threads);
+    // Parts of large pictures are compressed on all cores. OpenEXR has no threads until it is told, and to
+    // start them takes as long as two million samples do.
+    constexpr std::size_t kSamplesWorthThreads = 2'000'000;
+    int threads = Imf::globalThreadCount();
+    if (const int cores = int(threadCount());
+        threads < cores && cores > 1 &&
+        image.channels.size() * pitch * std::size_t(image.height) >= kSamplesWorthThreads)
+      Imf::setGlobalThreadCount(threads = cores);
     Imf::OutputFile file(stream, header, threads);
     file.setFrameBuffer(frame);
     file.writePixels(image.height);

@@ -46,20 +46,25 @@ namespace {
 // In the table, until bricks are numbered.
 constexpr std::int32_t kReached = 1, kDarkBrick = -1;
 
-constexpr int kN = LightVolume::kWidth;    // nodes across a brick
-constexpr int kPatch = kN + 5;             // density samples around a brick's slice, half a slice up and down
-constexpr int kPitch = detail::kSliceRow;  // floats per row of a patch
-static_assert(kN == detail::kSliceNodes);
+constexpr int kN = LightVolume::kWidth;  // nodes across a brick
+constexpr int kPatch = kN + 5;           // density samples around a brick's slice, half a slice up and down
+// The bricks that a row of a patch lies in at most: all their samples are in it.
+constexpr int kRowBricks = detail::kSampleRow / BrickGrid::kBrick;
+static_assert(kN == detail::kSliceNodes && BrickGrid::kBrick - 1 + kPatch <= detail::kSampleRow);
 
 }  // namespace
 
-/// Density samples of a plane, the first of which stands at (u, v).
+/// Density samples of a plane, the first of which stands at (u, v), in rows that begin with a brick.
 struct LightVolume::Patch {
   int u = 0, v = 0;
   /// Where it is set, all samples are this, and none is stored.
   std::optional<float> constant = 0.0f;
   bool isEmpty() const { return constant == 0.0f; }
-  alignas(64) std::array<float, (kPatch + 2) * kPitch> samples{};
+  const float* at(int atU, int atV) const {
+    return samples.data() + (atV - v) * detail::kSampleRow + (atU - u) + insideBrick(u);
+  }
+  /// With a row behind the last, where vectors end.
+  alignas(64) std::array<float, (kPatch + 1) * detail::kSampleRow> samples{};
 };
 
 /// The density seen along one index axis: (u, v) across, w along.
@@ -116,55 +121,53 @@ struct LightVolume::Sweep {
     patch.u = u0 + int(std::floor(slopeU * float(k))) - 2;
     patch.v = v0 + int(std::floor(slopeV * float(k))) - 2;
     constexpr int size = BrickGrid::kBrick;
-    const int bw = brickOf(k);
+    const int bw = brickOf(k), firstU = brickOf(patch.u), from = insideBrick(patch.u);
     patch.constant = constantOf(patch, bw);
     if (patch.constant) return !patch.isEmpty();
+    const int alongW =
+        w == 0 && coded ? CodedBricks::offsetAlongX(insideBrick(k)) : insideBrick(k) * sampleStride[w];
+    float* rows = patch.samples.data();
     for (int v1 = patch.v, vEnd = patch.v + kPatch; v1 < vEnd;) {
       const int bv = brickOf(v1), v2 = std::min(vEnd, (bv + 1) * size);
-      for (int u1 = patch.u, uEnd = patch.u + kPatch; u1 < uEnd;) {
-        const int bu = brickOf(u1), u2 = std::min(uEnd, (bu + 1) * size);
-        const std::int32_t pool = grid.poolIndex(bricks(bu, bv, bw));
-        float* rows = patch.samples.data() + (v1 - patch.v) * kPitch + (u1 - patch.u);
-        const int from = insideBrick(u1), countU = u2 - u1, countV = v2 - v1;
-        const auto copy = [=, this](const auto& at) {
-          if (u == 0) return copyRows(from, countU, countV, rows, at);
-          copyRows(from, countU, countV, rows, [&](int x, int y) { return at(x * sampleStride[u], y); });
-        };
-        const int alongW = w == 0 && coded ? CodedBricks::offsetAlongX(insideBrick(k))
-                                           : insideBrick(k) * sampleStride[w],
-                  first = alongW + insideBrick(v1) * sampleStride[v];
-        if (!(grid.ranges()[std::size_t(pool)].max > 0)) {
-          copy([](int, int) { return 0.0f; });
-        } else if (coded) {
-          const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(bricks(bu, bv, bw))];
-          const std::int16_t* codes = coded->codes() + entry.first + first;
-          for (int y = 0; u == 0 && y != countV; ++y, rows += kPitch) {
-            const auto row = CodedBricks::rowOf(codes + y * sampleStride[v], entry.unit);
-            std::copy_n(row.data() + from, countU, rows);
-          }
-          if (u != 0)
-            copy([&](int x, int y) {
-              return (float(codes[x + y * sampleStride[v]]) - CodedBricks::kZero) * entry.unit;
-            });
-        } else {
-          const float* samples = grid.brick(pool) + sampleOffset(0, 0, 0) + first;
-          copy([&](int x, int y) { return samples[x + y * sampleStride[v]]; });
-        }
-        u1 = u2;
-      }
-      v1 = v2;
+      std::array<RowSource, kRowBricks> sources;
+      for (int n = 0; n <= brickOf(from + kPatch - 1); ++n)
+        sources[std::size_t(n)] =
+            sourceOf(bricks(firstU + n, bv, bw), alongW + insideBrick(v1) * sampleStride[v]);
+      for (int y = 0; v1 != v2; ++v1, ++y)
+        for (int n = 0; n != kRowBricks; ++n, rows += size)
+          sources[std::size_t(n)].read(y * sampleStride[v], sampleStride[u], rows);
     }
     return true;
   }
 
-  // The samples at(x, y) of a part of a patch, x from `from` on, whose rows are mostly whole bricks.
-  template <class At>
-  static void copyRows(int from, int countU, int countV, float* rows, const At& at) {
-    for (int y = 0; y != countV; ++y, rows += kPitch)
-      if (countU == BrickGrid::kBrick)
-        for (int x = 0; x != BrickGrid::kBrick; ++x) rows[x] = at(x, y);
-      else
-        for (int x = 0; x != countU; ++x) rows[x] = at(from + x, y);
+  // The samples of a brick in the rows of a patch, of which the first begins with the first of `codes` or
+  // `samples`; none of a brick without density.
+  struct RowSource {
+    const std::int16_t* codes = nullptr;
+    const float* samples = nullptr;
+    float unit = 0;
+
+    void read(int offset, int stride, float* out) const {
+      constexpr int size = BrickGrid::kBrick;
+      if (codes && stride == 1) {
+        const auto row = CodedBricks::rowOf(codes + offset, unit);
+        std::copy_n(row.data(), size, out);
+      } else if (codes) {
+        for (int x = 0; x != size; ++x)
+          out[x] = (float(codes[offset + x * stride]) - CodedBricks::kZero) * unit;
+      } else if (samples) {
+        for (int x = 0; x != size; ++x) out[x] = samples[offset + x * stride];
+      } else {
+        std::fill_n(out, size, 0.0f);
+      }
+    }
+  };
+  RowSource sourceOf(const Vec3i& brick, int first) const {
+    const std::int32_t pool = grid.poolIndex(brick);
+    if (!(grid.ranges()[std::size_t(pool)].max > 0)) return {};
+    if (!coded) return {.samples = grid.brick(pool) + sampleOffset(0, 0, 0) + first};
+    const CodedBricks::Entry& entry = coded->entries()[grid.tableIndex(brick)];
+    return {.codes = coded->codes() + entry.first + first, .unit = entry.unit};
   }
 
   // What any node of a brick of the lattice adds to its column at least, its first nodes at (u0, v0).
@@ -205,9 +208,7 @@ struct LightVolume::Sweep {
     const float shiftU = slopeU * atW, shiftV = slopeV * atW;
     const float floorU = std::floor(shiftU), floorV = std::floor(shiftV);
     const detail::SliceWeights mix{weights(shiftU - floorU), weights(shiftV - floorV)};
-    const float* first =
-        patch.samples.data() + (v0 + int(floorV) - 1 - patch.v) * kPitch + (u0 + int(floorU) - 1 - patch.u);
-    detail::mixSlice(first, mix, most, out);
+    detail::mixSlice(patch.at(u0 + int(floorU) - 1, v0 + int(floorV) - 1), mix, most, out);
   }
 };
 

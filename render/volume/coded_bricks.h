@@ -91,9 +91,10 @@ class CodedBricks {
   /// A row, the first node of which is the first of `codes`.
   static std::array<float, kWidth> rowOf(const std::int16_t* codes, float unit) {
     std::array<float, kWidth> nodes;
-    for (int x = 0; x != kHalfCells; ++x) nodes[std::size_t(x)] = (float(codes[x]) - kZero) * unit;
-    for (int x = kHalfCells; x != kWidth; ++x)
-      nodes[std::size_t(x)] = (float(codes[offsetAlongX(x)]) - kZero) * unit;
+    for (int half = 0; half != 2; ++half)
+      for (int x = 0; x != kHalfCells; ++x)
+        nodes[std::size_t(half * kHalfCells + x)] = (float(codes[half * kHalf + x]) - kZero) * unit;
+    nodes.back() = (float(codes[offsetAlongX(kWidth - 1)]) - kZero) * unit;
     return nodes;
   }
 

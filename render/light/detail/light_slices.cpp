@@ -33,8 +33,10 @@ void mixSliceOf(const float* HWY_RESTRICT samples, const detail::SliceWeights& w
   using namespace detail;
   const SliceLanes d;
   alignas(64) float dense[(kSliceNodes + 4) * kSliceRow], rows[(kSliceNodes + 3) * kSliceRow];
-  for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)
-    hn::Store(hn::Min(hn::Max(hn::LoadU(d, samples + i), hn::Zero(d)), hn::Set(d, most)), d, dense + i);
+  for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes) {
+    const float* from = samples + i / kSliceRow * kSampleRow + i % kSliceRow;
+    hn::Store(hn::Min(hn::Max(hn::LoadU(d, from), hn::Zero(d)), hn::Set(d, most)), d, dense + i);
+  }
   // Only lanes that do not matter look behind the last row.
   std::fill_n(dense + (kSliceNodes + 3) * kSliceRow, kSliceRow, 0.0f);
   for (int i = 0; i != (kSliceNodes + 3) * kSliceRow; i += kSliceLanes)

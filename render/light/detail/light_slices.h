@@ -7,6 +7,8 @@ namespace nephele::detail {
 /// Nodes of a brick's slice in LightVolume, in rows that are a round number of the widest vectors; what lies
 /// behind the ninth of a row does not matter.
 inline constexpr int kSliceNodes = 9, kSliceRow = 16, kSliceArea = kSliceNodes * kSliceRow;
+/// Floats from one row of density samples to the next.
+inline constexpr int kSampleRow = 24;
 struct alignas(64) SliceNodes : std::array<float, kSliceArea> {};
 
 /// What four samples in a row count for, across the light.
@@ -14,8 +16,8 @@ struct SliceWeights {
   std::array<float, 4> u, v;
 };
 
-/// Mixes 12 x 12 samples, `kSliceRow` apart from row to row, into the nodes of a slice; samples below 0
-/// count as 0, and those above `most` as that.
+/// Mixes 12 x 12 samples, `kSampleRow` apart from row to row and readable for `kSliceRow` each, into the
+/// nodes of a slice; samples below 0 count as 0, and those above `most` as that.
 void mixSlice(const float* samples, const SliceWeights& weights, float most, SliceNodes& out);
 
 /// out = end (a + b) + middle (c + d): Simpson's rule with its middle in two halves.
