@@ -5,9 +5,9 @@
 #
 # vdb_render's -gain 0 is single scattering with isotropic phase and radiance colour * albedo, so that our sun has the
 # irradiance 4 pi. It counts extinction per voxel: ours is that divided by the voxel size. Both take one ray through every
-# pixel's centre; vdb_render's steps and shadow steps are one voxel long, ours at most three, and pixels whose neighbours
-# agree within 8 % are interpolated (--adaptive), at a smaller error. The reference is vdb_render at a tenth of the step,
-# without cutoffs, on every fifth pixel.
+# pixel's centre; vdb_render's steps and shadow steps are one voxel long, ours at most three, at a smaller error. With
+# NEPHELE_RENDER_OPTIONS='--adaptive 0.08' pixels whose neighbours agree within 8 % are interpolated. The reference is
+# vdb_render at a tenth of the step, without cutoffs, on every fifth pixel.
 #
 # Prints, for several extinctions per voxel, seconds of the whole programs (medians of three), of a frame of a turntable
 # after its light is made (mean of 24, median of three turntables), and root mean square errors.
@@ -42,7 +42,7 @@ error() {  # root mean square of the red channel against the reference
 
 camera="-res 640x480 -translate 0,0.4,3.2 -lookat 0,0,0 -fov 32 -light 0.5,0.6,0.6,1,1,1 -gain 0"
 ours="--size 640x480 --camera-position 0,0.4,3.2 --look-at 0,0,0 --fov 32 --sun 39.80557,37.53035,12.5663706 --sky 0,0,0
-  --phase isotropic --octaves 1 --samples 1 --aov none --adaptive 0.08 ${NEPHELE_RENDER_OPTIONS:-}"
+  --phase isotropic --octaves 1 --samples 1 --aov none ${NEPHELE_RENDER_OPTIONS:-}"
 mkdir -p frames
 echo "extinction/voxel  vdb_render s  nephele s  ratio  frame s  ratio  vdb_render error  nephele error"
 for pair in 0.02:0.0001 0.05:0.00025 0.085:0.000425 0.1:0.0005 0.5:0.0025 1.5:0.1; do
