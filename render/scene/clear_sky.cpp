@@ -43,6 +43,9 @@ using Colour = std::array<double, 3>;
 double square(double x) {
   return x * x;
 }
+double cube(double x) {
+  return x * x * x;
+}
 
 // What is at a height.
 struct AirThere {
@@ -129,7 +132,7 @@ class Transmittance {
       Colour depth{};
       for (const double part : {-lowest, way - lowest})
         for (int i = 0; i != kSteps; ++i) {
-          const double from = std::pow(double(i) / kSteps, 3), to = std::pow((i + 1.0) / kSteps, 3);
+          const double from = cube(double(i) / kSteps), to = cube((i + 1.0) / kSteps);
           for (const double point : kPoints) {
             const AirThere air =
                 atmosphere.at(radiusAfter(radius, rise, lowest + part * (from + point * (to - from))));
@@ -157,42 +160,60 @@ class Transmittance {
   Table<128, 64> table_;
 };
 
-// What a ray meets: along it, of one or two kinds of light, and the ground if that is where it ends.
-template <std::size_t kKinds>
-struct Seen {
-  std::array<Colour, kKinds> light{};
-  Colour left{1, 1, 1};
-  double way = 0;
-  bool isGround = false;
-};
-
-// Adds up `sourcesAt(radius, way, air)`, light per length, along a ray; no farther than `most` and through
+// The way of a ray through the air, the same for all that are as steep; no farther than `most` and through
 // the ground, if that is given.
-template <std::size_t kKinds, class Sources>
-Seen<kKinds> lookAlong(const Atmosphere& atmosphere, double radius, double rise, int steps,
-                       const Sources& sourcesAt, double most = std::numeric_limits<double>::infinity()) {
-  Seen<kKinds> seen;
-  const double ground = std::isinf(most) ? wayToGround(radius, rise) : -1;
-  seen.isGround = ground >= 0;
-  seen.way = std::min(seen.isGround ? ground : wayToTop(radius, rise), most);
-  double before = 0;
-  for (int i = 0; i != steps; ++i) {
-    // Shorter near the eye, where the air is densest.
-    const double end = seen.way * square((i + 1.0) / steps), length = end - before,
-                 way = before + 0.5 * length;
-    const double there = radiusAfter(radius, rise, way);
-    const AirThere air = atmosphere.at(there);
-    const std::array<Colour, kKinds> sources = sourcesAt(there, way, air);
-    for (std::size_t c = 0; c != 3; ++c) {
-      const double step = std::exp(-air.taken[c] * length),
-                   whole = seen.left[c] * (air.taken[c] > 1e-12 ? (1 - step) / air.taken[c] : length);
-      for (std::size_t k = 0; k != kKinds; ++k) seen.light[k][c] += whole * sources[k][c];
-      seen.left[c] *= step;
+struct Path {
+  struct Step {
+    double radius, way;
+    AirThere air;
+    // What arrives of light that is sent along the step, as a length.
+    Colour counts;
+  };
+  static constexpr int kMostSteps = 24;
+
+  Path(const Atmosphere& atmosphere, double radius, double rise, int count,
+       double most = std::numeric_limits<double>::infinity())
+      : stepCount(count) {
+    const double toGround = std::isinf(most) ? wayToGround(radius, rise) : -1;
+    isGround = toGround >= 0;
+    way = std::min(isGround ? toGround : wayToTop(radius, rise), most);
+    double before = 0;
+    for (int i = 0; i != count; ++i) {
+      // Shorter near the eye, where the air is densest.
+      const double end = way * square((i + 1.0) / count), length = end - before;
+      Step& step = steps[std::size_t(i)];
+      step.way = before + 0.5 * length;
+      step.radius = radiusAfter(radius, rise, step.way);
+      step.air = atmosphere.at(step.radius);
+      for (std::size_t c = 0; c != 3; ++c) {
+        const double taken = step.air.taken[c], passed = std::exp(-taken * length);
+        step.counts[c] = left[c] * (taken > 1e-12 ? (1 - passed) / taken : length);
+        left[c] *= passed;
+      }
+      before = end;
     }
-    before = end;
   }
-  return seen;
-}
+
+  // Sums of one or two kinds of light, `sourcesAt(step)` per length.
+  template <std::size_t kKinds, class Sources>
+  std::array<Colour, kKinds> light(const Sources& sourcesAt) const {
+    std::array<Colour, kKinds> sums{};
+    for (int i = 0; i != stepCount; ++i) {
+      const Step& step = steps[std::size_t(i)];
+      const std::array<Colour, kKinds> sources = sourcesAt(step);
+      for (std::size_t k = 0; k != kKinds; ++k)
+        for (std::size_t c = 0; c != 3; ++c) sums[k][c] += step.counts[c] * sources[k][c];
+    }
+    return sums;
+  }
+
+  std::array<Step, kMostSteps> steps;
+  int stepCount;
+  // Of what comes from its end.
+  Colour left{1, 1, 1};
+  double way;
+  bool isGround;
+};
 
 // The cosine between a direction and up after a way, both given at its begin: `along` is that between the
 // direction and the ray.
@@ -224,14 +245,16 @@ struct ClearSky::Data {
     // By Gauss' rule of three points in the square of the sine, which integrates the cosine.
     constexpr double kNodes[3] = {0.112702, 0.5, 0.887298}, kWeights[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
     constexpr int kTurns = 16;
-    for (int i = 0; i != 3; ++i)
+    constexpr double from = kGround + 1e-3;
+    for (int i = 0; i != 3; ++i) {
+      const double rise = std::sqrt(kNodes[i]), flat = std::sqrt(1 - kNodes[i]);
+      const Path path = pathFrom(from, rise);
       for (int turn = 0; turn != kTurns; ++turn) {
-        const double rise = std::sqrt(kNodes[i]), flat = std::sqrt(1 - kNodes[i]),
-                     angle = 2 * double(kPi) * (turn + 0.5) / kTurns;
-        const Colour light =
-            look(kGround + 1e-3, {flat * std::cos(angle), rise, flat * std::sin(angle)}).light[0];
+        const double angle = 2 * double(kPi) * (turn + 0.5) / kTurns;
+        const Colour light = lightAlong(path, from, {flat * std::cos(angle), rise, flat * std::sin(angle)});
         for (std::size_t c = 0; c != 3; ++c) skyOnGround[c] += double(kPi) * kWeights[i] / kTurns * light[c];
       }
+    }
   }
 
   static double heightAt(double v) { return kGround + 1e-3 + square(v) * (kTop - kGround - 2e-3); }
@@ -245,58 +268,73 @@ struct ClearSky::Data {
     constexpr int kRises = 8, kTurns = 4, kSteps = 14;
     Colour second{}, share{};
     const double sunFlat = std::sqrt(std::max(1 - square(sunRise), 0.0));
-    for (int i = 0; i != kRises; ++i)
+    for (int i = 0; i != kRises; ++i) {
+      const double rise = (i + 0.5) * 2 / kRises - 1, flat = std::sqrt(1 - square(rise));
+      const Path path(atmosphere, there, rise, kSteps);
       for (int turn = 0; turn != kTurns; ++turn) {
-        const double rise = (i + 0.5) * 2 / kRises - 1, flat = std::sqrt(1 - square(rise));
         const double along = rise * sunRise + flat * sunFlat * std::cos(double(kPi) * (turn + 0.5) / kTurns);
         // What is scattered of the sun's light, and of light that is 1 everywhere.
-        const auto seen =
-            lookAlong<2>(atmosphere, there, rise, kSteps, [&](double r, double way, const AirThere& air) {
-              const Colour lit = transmittance.ofSun(r, riseAfter(there, sunRise, along, way, r));
-              std::array<Colour, 2> sources;
-              for (std::size_t c = 0; c != 3; ++c) {
-                sources[1][c] = air.air[c] + air.haze[c];
-                sources[0][c] = sources[1][c] * lit[c] / (4 * double(kPi));
-              }
-              return sources;
-            });
-        Colour sent = seen.light[0];
-        if (seen.isGround) {
-          const double onGround = riseAfter(there, sunRise, along, seen.way, kGround);
+        const auto light = path.light<2>([&](const Path::Step& step) {
+          const Colour lit =
+              transmittance.ofSun(step.radius, riseAfter(there, sunRise, along, step.way, step.radius));
+          std::array<Colour, 2> sources;
+          for (std::size_t c = 0; c != 3; ++c) {
+            sources[1][c] = step.air.air[c] + step.air.haze[c];
+            sources[0][c] = sources[1][c] * lit[c] / (4 * double(kPi));
+          }
+          return sources;
+        });
+        Colour sent = light[0];
+        if (path.isGround) {
+          const double onGround = riseAfter(there, sunRise, along, path.way, kGround);
           const Colour lit = transmittance.ofSun(kGround + 1e-3, onGround);
           for (std::size_t c = 0; c != 3; ++c)
-            sent[c] += seen.left[c] * ground[c] / double(kPi) * lit[c] * std::max(onGround, 0.0);
+            sent[c] += path.left[c] * ground[c] / double(kPi) * lit[c] * std::max(onGround, 0.0);
         }
         for (std::size_t c = 0; c != 3; ++c) {
           second[c] += sent[c] / (kRises * kTurns);
-          share[c] += seen.light[1][c] / (kRises * kTurns);
+          share[c] += light[1][c] / (kRises * kTurns);
         }
       }
+    }
     for (std::size_t c = 0; c != 3; ++c) second[c] /= 1 - std::min(share[c], 0.999);
     return second;
   }
 
-  // Of light over what the sun sends outside.
-  Seen<1> look(double from, const Vec3d& towards,
-               double most = std::numeric_limits<double>::infinity()) const {
-    constexpr int kSteps = 24;
+  Path pathFrom(double from, double rise, double most = std::numeric_limits<double>::infinity()) const {
+    return {atmosphere, from, rise, Path::kMostSteps, most};
+  }
+
+  // Of a path from a height in a direction that is as steep, over what the sun sends outside.
+  Colour lightAlong(const Path& path, double from, const Vec3d& towards) const {
     const double along = dot(towards, sun), square1 = square(along);
     const double air = 3 / (16 * double(kPi)) * (1 + square1);
     constexpr double g = kHazeCosine;
     const double haze = 3 / (8 * double(kPi)) * (1 - g * g) * (1 + square1) /
                         ((2 + g * g) * std::pow(1 + g * g - 2 * g * along, 1.5));
-    return lookAlong<1>(
-        atmosphere, from, towards.y, kSteps,
-        [&](double r, double way, const AirThere& there) {
-          const double sunRise = riseAfter(from, sun.y, along, way, r);
-          const Colour lit = transmittance.ofSun(r, sunRise), before = scatteredBefore(r, sunRise);
-          Colour source;
-          for (std::size_t c = 0; c != 3; ++c)
-            source[c] = (there.air[c] * air + there.haze[c] * haze) * lit[c] +
-                        (there.air[c] + there.haze[c]) * before[c];
-          return std::array<Colour, 1>{source};
-        },
-        most);
+    return path.light<1>([&](const Path::Step& step) {
+      const double sunRise = riseAfter(from, sun.y, along, step.way, step.radius);
+      const Colour lit = transmittance.ofSun(step.radius, sunRise),
+                   before = scatteredBefore(step.radius, sunRise);
+      Colour source;
+      for (std::size_t c = 0; c != 3; ++c)
+        source[c] = (step.air.air[c] * air + step.air.haze[c] * haze) * lit[c] +
+                    (step.air.air[c] + step.air.haze[c]) * before[c];
+      return std::array<Colour, 1>{source};
+    })[0];
+  }
+
+  // Of the sky, or the ground behind its air.
+  Vec3f radianceAlong(const Path& path, const Vec3d& towards) const {
+    Colour light = lightAlong(path, radius, towards);
+    if (path.isGround) {
+      const double sunRise = riseAfter(radius, sun.y, dot(towards, sun), path.way, kGround);
+      const Colour lit = transmittance.ofSun(kGround + 1e-3, sunRise);
+      for (std::size_t c = 0; c != 3; ++c)
+        light[c] +=
+            path.left[c] * ground[c] / double(kPi) * (lit[c] * std::max(sunRise, 0.0) + skyOnGround[c]);
+    }
+    return {float(kSun[0] * light[0]), float(kSun[1] * light[1]), float(kSun[2] * light[2])};
   }
 };
 
@@ -321,25 +359,18 @@ Vec3f ClearSky::sunlight() const {
 
 Vec3f ClearSky::radiance(const Vec3f& towards) const {
   const Vec3d way = normalize(Vec3d(towards));
-  const Seen<1> seen = data_->look(data_->radius, way);
-  Colour light = seen.light[0];
-  if (seen.isGround) {
-    const double sunRise = riseAfter(data_->radius, data_->sun.y, dot(way, data_->sun), seen.way, kGround);
-    const Colour lit = data_->transmittance.ofSun(kGround + 1e-3, sunRise);
-    for (std::size_t c = 0; c != 3; ++c)
-      light[c] += seen.left[c] * data_->ground[c] / double(kPi) *
-                  (lit[c] * std::max(sunRise, 0.0) + data_->skyOnGround[c]);
-  }
-  return {float(kSun[0] * light[0]), float(kSun[1] * light[1]), float(kSun[2] * light[2])};
+  return data_->radianceAlong(data_->pathFrom(data_->radius, way.y), way);
 }
 
 ClearSky::Air ClearSky::airBefore(const Vec3f& towards, float metres) const {
   require(metres >= 0, fmt::format("sky: expected a distance of at least 0 metres, got {}", metres));
-  const Seen<1> seen = data_->look(data_->radius, normalize(Vec3d(towards)), double(metres) * 1e-3);
+  const Vec3d way = normalize(Vec3d(towards));
+  const Path path = data_->pathFrom(data_->radius, way.y, double(metres) * 1e-3);
+  const Colour light = data_->lightAlong(path, data_->radius, way);
   Air result;
   for (std::size_t c = 0; c != 3; ++c) {
-    result.left[int(c)] = float(seen.left[c]);
-    result.light[int(c)] = float(kSun[c] * seen.light[0][c]);
+    result.left[int(c)] = float(path.left[c]);
+    result.light[int(c)] = float(kSun[c] * light[c]);
   }
   return result;
 }
@@ -362,15 +393,17 @@ Environment ClearSky::map(int rows, float intensity) const {
   const double sunAzimuth = std::atan2(data_->sun.x, data_->sun.z);
   std::vector<Vec3f> values(std::size_t(width) * std::size_t(rows));
   parallelFor(std::size_t(rows), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y != end; ++y)
+    for (std::size_t y = begin; y != end; ++y) {
+      const double theta = double(kPi) * (double(y) + 0.5) / rows, rise = std::cos(theta),
+                   flat = std::sin(theta);
+      const Path path = data_->pathFrom(data_->radius, rise);
       for (int x = 0; x != rows; ++x) {
-        const double theta = double(kPi) * (double(y) + 0.5) / rows,
-                     turn = sunAzimuth + 2 * double(kPi) * (x + 0.5) / width;
-        const Vec3f colour = radiance(Vec3f(
-            Vec3d{std::sin(theta) * std::sin(turn), std::cos(theta), std::sin(theta) * std::cos(turn)}));
+        const double turn = sunAzimuth + 2 * double(kPi) * (x + 0.5) / width;
+        const Vec3f colour = data_->radianceAlong(path, {flat * std::sin(turn), rise, flat * std::cos(turn)});
         values[y * std::size_t(width) + std::size_t(rows - 1 - x)] = colour;
         values[y * std::size_t(width) + std::size_t(rows + x)] = colour;
       }
+    }
   });
   Environment::Options options;
   options.intensity = intensity;
