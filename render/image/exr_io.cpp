@@ -201,15 +201,14 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
     }
   }
   detail::writeWhole(output, [&](Imf::OStream& stream) {
-    // Parts of large pictures are compressed on all cores. OpenEXR has no threads until it is told, and to
-    // start them takes as long as two million samples do.
+    // Parts of large pictures are compressed on all cores. OpenEXR has no threads until it is told, and
+    // starting them takes as long as compressing two million samples.
     constexpr std::size_t kSamplesWorthThreads = 2'000'000;
-    int threads = Imf::globalThreadCount();
-    if (const int cores = int(threadCount());
-        threads < cores && cores > 1 &&
-        image.channels.size() * pitch * std::size_t(image.height) >= kSamplesWorthThreads)
-      Imf::setGlobalThreadCount(threads = cores);
-    Imf::OutputFile file(stream, header, threads);
+    const std::size_t samples = image.channels.size() * pitch * std::size_t(image.height);
+    const int cores = int(threadCount());
+    if (samples >= kSamplesWorthThreads && cores > 1 && Imf::globalThreadCount() < cores)
+      Imf::setGlobalThreadCount(cores);
+    Imf::OutputFile file(stream, header, Imf::globalThreadCount());
     file.setFrameBuffer(frame);
     file.writePixels(image.height);
   });
