@@ -36,6 +36,7 @@ struct OpenVdbFunctions {
   decltype(&nephele::describe) describe;
   decltype(&nephele::valueRange) valueRange;
   decltype(&nephele::listOf) listOf;
+  decltype(&nephele::requireWritable) requireWritable;
   decltype(&nephele::labelOf) labelOf;
   decltype(&nephele::metadataOf) metadataOf;
   decltype(&nephele::copyMetadata) copyMetadata;

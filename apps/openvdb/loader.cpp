@@ -53,6 +53,10 @@ std::string listOf(const std::vector<VdbGrid>& grids) {
   return functions().listOf(grids);
 }
 
+void requireWritable(const std::vector<VdbGrid>& grids) {
+  functions().requireWritable(grids);
+}
+
 VdbGridLabel labelOf(const VdbGrid& grid) {
   return functions().labelOf(grid);
 }

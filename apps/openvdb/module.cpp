@@ -11,6 +11,7 @@ const nephele::apps::OpenVdbFunctions nepheleOpenVdbFunctions{
     .describe = &nephele::describe,
     .valueRange = &nephele::valueRange,
     .listOf = &nephele::listOf,
+    .requireWritable = &nephele::requireWritable,
     .labelOf = &nephele::labelOf,
     .metadataOf = &nephele::metadataOf,
     .copyMetadata = &nephele::copyMetadata,

@@ -49,7 +49,10 @@ void carry(const AdvectArguments& arguments, Run& run) {
 
   run.begin("advect");
   run.expect(0.05, 0.9);
-  const AdvectedGrids result = advectGrids(input.bricks, velocity, options, run);
+  // Velocities that are too fast are so beside the voxels of the input.
+  const AdvectedGrids result =
+      namingFile(arguments.velocity.path.empty() ? arguments.input : arguments.velocity.path,
+                 [&] { return advectGrids(input.bricks, velocity, options, run); });
   run.stats["steps"] = stepsOf(result);
 
   run.begin("write");

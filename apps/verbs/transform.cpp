@@ -19,6 +19,7 @@ void moveMesh(const TransformOptions& options, Run& run) {
 std::vector<VdbGrid> turnedGrids(const TransformOptions& options) {
   std::vector<VdbGrid> grids = readVdbFile(options.input);
   namingFile(options.input, [&] {
+    requireWritable(grids);
     for (VdbGrid& grid : grids) grid = moved(grid, options.turn());
   });
   return grids;

@@ -82,6 +82,7 @@ CarriedGrids carriedGrids(const std::vector<VdbGrid>& grids) {
     if (const Box box = activeBox(grid); !box.isEmpty())
       result.box = result.box.including(box.min).including(box.max);
   }
+  if (!result.originals.empty()) requireWritable(result.originals);
   return result;
 }
 

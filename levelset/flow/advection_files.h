@@ -21,7 +21,7 @@ struct CarriedGrids {
   Box box;
 };
 
-/// @throws Error naming the grid if values or a transform are not usable.
+/// @throws Error naming the grid if values or a transform are not usable, or two have one name.
 CarriedGrids carriedGrids(const std::vector<VdbGrid>& grids);
 
 /// `bricks` as the grids of a file again, in the order of `like.bricks`: with the names, classes, types

@@ -4,7 +4,7 @@
 // Writing builds each node of 16^3 leaves on its own, straight from the table, constant positions as tiles,
 // so that no pruning or flood fill is needed.
 //
-// Limits: the table is dense, so two far-apart voxels cost the box between them; a limit refuses such grids.
+// Limits: the table is dense, so two far-apart voxels cost the box between them; limits refuse such grids.
 #include "nephele/levelset/grid/openvdb_bridge.h"
 
 #include <fmt/format.h>
@@ -31,13 +31,23 @@ using openvdb::FloatTree;
 constexpr int kBrick = BrickGrid::kBrick;
 constexpr int kWidth = BrickGrid::kWidth;
 constexpr double kMostInTiles = 1e8;
+/// Places of a table that any grid may have, 256 MB of them, and those for each of its leaves and tiles: a
+/// small file must not take the memory of a large one.
+constexpr double kPlaces = 1 << 26, kPlacesOfAPart = 256;
 
 Vec3i brickOf(const openvdb::Coord& c) {
   return {c.x() >> 3, c.y() >> 3, c.z() >> 3};
 }
 
+bool holdsAnything(const FloatTree::LeafNodeType& leaf, float background) {
+  const float* values = leaf.buffer().data();
+  return !leaf.isEmpty() ||
+         std::any_of(values, values + leaf.SIZE, [&](float value) { return value != background; });
+}
+
 /// visitTile(first brick, bricks along an axis, value), for all tiles that are not background, and
-/// visitLeaf(brick, leaf). Inactive tiles are the inside of level sets, and in fog they are nothing.
+/// visitLeaf(brick, leaf), likewise. Inactive tiles are the inside of level sets, and in fog they are
+/// nothing.
 template <class VisitTile, class VisitLeaf>
 void forEachPart(const openvdb::FloatGrid& grid, const VisitTile& visitTile, const VisitLeaf& visitLeaf) {
   const FloatTree& tree = grid.tree();
@@ -52,7 +62,8 @@ void forEachPart(const openvdb::FloatGrid& grid, const VisitTile& visitTile, con
     visitTiles(*upper, 16);
     for (auto lower = upper->cbeginChildOn(); lower; ++lower) {
       visitTiles(*lower, 1);
-      for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf) visitLeaf(brickOf(leaf->origin()), *leaf);
+      for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
+        if (holdsAnything(*leaf, background)) visitLeaf(brickOf(leaf->origin()), *leaf);
     }
   }
   visitTiles(tree.root(), 512);
@@ -68,7 +79,9 @@ BlockTable blocksOf(const openvdb::FloatGrid& grid, const std::string& name) {
   result.constants = {tree.background()};
   constexpr int kFar = std::numeric_limits<int>::max();
   Vec3i first{kFar, kFar, kFar}, last{-kFar, -kFar, -kFar};
+  double parts = 0;
   const auto include = [&](const Vec3i& low, int span) {
+    ++parts;
     first = min(first, low);
     last = max(last, low + Vec3i{span - 1, span - 1, span - 1});
   };
@@ -82,8 +95,14 @@ BlockTable blocksOf(const openvdb::FloatGrid& grid, const std::string& name) {
   const Vec3i one{1, 1, 1};
   first -= one;
   last += one;
-  requireHoldable("grid " + name, double(last.x) - first.x + 1, double(last.y) - first.y + 1,
-                  double(last.z) - first.z + 1);
+  const Vec3d sides = Vec3d(last) - Vec3d(first) + Vec3d{1, 1, 1};
+  requireHoldable("grid " + name, sides.x, sides.y, sides.z);
+  require(
+      sides.x * sides.y * sides.z <= kPlaces + kPlacesOfAPart * parts,
+      fmt::format(
+          "grid {} has {:.0f} bricks and tiles in a box of {:.0f} x {:.0f} x {:.0f} voxels, which are too "
+          "few for one so large; split it into grids of what lies together",
+          name, parts, sides.x * kBrick, sides.y * kBrick, sides.z * kBrick));
   result.codes = FlatBrickTable({first, last - first + one});
 
   std::map<float, std::int32_t> codes;

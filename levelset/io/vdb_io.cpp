@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "nephele/levelset/io/detail/file_extension.h"
 #include "nephele/levelset/io/detail/openvdb_grid.h"
@@ -153,20 +154,27 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
   failReading(path, fmt::format("no grid '{}'; {}", name, listOf(wrapped(grids))));
 }
 
+void requireWritable(const std::vector<VdbGrid>& grids) {
+  require(!grids.empty(), "no grid to write");
+  std::set<std::string> names;
+  for (const VdbGrid& each : grids) {
+    const openvdb::GridBase& grid = *each.impl().grid;
+    // Their values were not read and would be lost.
+    require(detail::isCheckable(grid), fmt::format("the grid '{}' of {} cannot be written",
+                                                   printable(grid.getName()), grid.valueType()));
+    require(names.insert(grid.getName()).second,
+            fmt::format("two grids are called '{}'", printable(grid.getName())));
+  }
+}
+
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
                   const std::map<std::string, std::string>& metadata) {
   detail::initializeOpenVdb();
-  require(!grids.empty(), path + ": no grid to write");
+  namingFile(path, [&] { requireWritable(grids); });
   openvdb::GridPtrVec labelled;
   for (const VdbGrid& grid : grids) {
     // Shares the tree: only the metadata of what is written differs.
     openvdb::GridBase::Ptr copy = grid.impl().grid->copyGrid();
-    // Their values were not read and would be lost.
-    require(detail::isCheckable(*copy), fmt::format("{}: the grid '{}' of {} cannot be written", path,
-                                                    printable(copy->getName()), copy->valueType()));
-    for (const auto& other : labelled)
-      require(other->getName() != copy->getName(),
-              fmt::format("{}: two grids are called '{}'", path, printable(copy->getName())));
     for (const auto& [key, value] : metadata) {
       require(!key.empty(), path + ": metadata needs names");
       copy->removeMeta(key);

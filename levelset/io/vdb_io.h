@@ -129,10 +129,13 @@ VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label);
 /// of float, or a value is not finite.
 VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
+/// Of grids that were read and are to be written again. @throws Error naming a grid of points, whose values
+/// are not read, or two grids of one name.
+void requireWritable(const std::vector<VdbGrid>& grids);
+
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)
-/// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path, also for
-/// grids of points, whose values are not read, and texts over 64 MiB, which readers refuse; no partial file
-/// stays.
+/// goes to every grid. File version readable by OpenVDB 10. @throws Error naming the path, also for what
+/// requireWritable refuses, and texts over 64 MiB, which readers refuse; no partial file stays.
 void writeVdbFile(const std::string& path, const std::vector<VdbGrid>& grids,
                   const std::map<std::string, std::string>& metadata = {});
 

@@ -155,7 +155,10 @@ TEST_F(AdvectVerb, RefusesFilesThatDoNotFit) {
       {"advect " + volume("empty_grid.vdb") + out + noise, "holds anything"},
       {"advect " + volume("sphere_points.vdb") + out + noise, "holds anything"},
       {"advect /nowhere/cloud.vdb" + out + noise, "/nowhere/cloud.vdb: no such file"},
-      {"advect " + cloud() + out + "--velocity noise:amplitude=1e20", "voxels at once"}};
+      {"advect " + cloud() + out + "--velocity noise:amplitude=1e20",
+       cloud() + ": advection: the velocity carries matter"},
+      {"advect " + cloud() + out + "--dt 1e6 --velocity " + volume("velocity_vec3_tiles.vdb"),
+       volume("velocity_vec3_tiles.vdb") + ": advection: the velocity carries matter"}};
   for (const auto& [command, said] : cases) {
     const ProgramResult result = runProgram(command);
     EXPECT_EQ(result.exitCode, 1) << command;

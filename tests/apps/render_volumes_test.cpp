@@ -91,6 +91,11 @@ TEST(RenderBadInput, IsRefusedByNameAndReason) {
   } cases[] = {{0, set(NAN), "holds values that are not finite"},
                {0, set(INFINITY), "holds values that are not finite"},
                {0, set(1e30f), "expected values up to 1e+18"},
+               {0,
+                [](FloatGrid& grid) {
+                  grid.getAccessor().setValue({4000, 4000, 4000}, 1.0f);
+                },
+                "in a box of 4032 x 4032 x 4032 voxels, which are too few for one so large"},
                {0.5f, [](FloatGrid&) {}, "expected 0 outside of the volume, but its background is 0.5"},
                {-1, [](FloatGrid&) {}, "its background is -1"},
                {0, [](FloatGrid& grid) { grid.setGridClass(openvdb::GRID_LEVEL_SET); }, "has no surface"},
@@ -114,6 +119,20 @@ TEST(RenderBadInput, IsRefusedByNameAndReason) {
     EXPECT_NE(result.errors.find(c.says), std::string::npos) << c.says << ": " << result.errors;
     EXPECT_EQ(folder.entryCount(), 0u);
   }
+}
+
+TEST(RenderBadInput, NothingFarAwayTakesNoMemory) {
+  const TemporaryFolder folder;
+  const std::string options = " --size 8x6 --samples 1 -o " + folder.file("a.exr");
+  const auto rendered = [&](const std::function<void(openvdb::FloatGrid&)>& change) {
+    // A table of the bricks in between would have 4 GB.
+    const ProgramResult result =
+        runProgram("render " + writeBall(folder, 0, change) + options, "ulimit -v 3000000;");
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file("a.exr")).channel("A").values;
+  };
+  const auto alone = rendered([](openvdb::FloatGrid&) {});
+  EXPECT_EQ(rendered([](openvdb::FloatGrid& grid) { grid.tree().touchLeaf({8000, 8000, 8000}); }), alone);
 }
 
 TEST(RenderBadInput, TransformsAreWhatTheySay) {

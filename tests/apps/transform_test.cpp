@@ -78,5 +78,15 @@ TEST_F(TransformVerb, RefusesWhatDoesNotFit) {
   EXPECT_EQ(folder_.entryCount(), 1u);
 }
 
+TEST_F(TransformVerb, NamesTheInputWhoseGridsCannotBeWrittenAgain) {
+  const std::string points = sharedData("volumes/sphere_points.vdb");
+  NEPHELE_REQUIRE_SHARED_DATA(points);
+  const ProgramResult result = runProgram("transform " + points + " -o " + file("b.vdb") + " --scale 2");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find(points + ": the grid '"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find("cannot be written"), std::string::npos) << result.errors;
+  EXPECT_EQ(folder_.entryCount(), 0u);
+}
+
 }  // namespace
 }  // namespace nephele::test

@@ -227,11 +227,12 @@ void writeOutputs(Calls& calls) {
 
 }  // namespace
 
-void useCalls(const Input& input) {
+bool useCalls(const Input& input) {
   Calls calls(reinterpret_cast<const std::uint8_t*>(input.bytes.data()), input.bytes.size());
   constexpr void (*kKinds[])(Calls&) = {writeMeshes, writeVolumes, writePictures, writeDeepPictures,
                                         writeOutputs};
   calls.PickValueInArray(kKinds)(calls);
+  return true;
 }
 
 }  // namespace nephele::fuzz

@@ -30,24 +30,25 @@ using Mutator = std::size_t (*)(Bytes bytes, std::size_t size, unsigned seed, co
 struct Format {
   std::string_view name;
   std::string_view extension;
-  void (*use)(const Input& input);
+  /// Returns whether it could be read.
+  bool (*use)(const Input& input);
   /// Of formats that bytes changed at random never get into.
   Mutator mutator = nullptr;
 };
 
 std::span<const Format> formats();
 
-void useMesh(const Input& input);
-void useVolume(const Input& input);
-void usePicture(const Input& input);
-void useDeepPicture(const Input& input);
-void useCamera(const Input& input);
+bool useMesh(const Input& input);
+bool useVolume(const Input& input);
+bool usePicture(const Input& input);
+bool useDeepPicture(const Input& input);
+bool useCamera(const Input& input);
 /// What follows on a line "...", the end of YAML, is a table that the configuration may name.
-void useViewConfig(const Input& input);
-void useToml(const Input& input);
-void useFieldTexts(const Input& input);
-void useScript(const Input& input);
+bool useViewConfig(const Input& input);
+bool useToml(const Input& input);
+bool useFieldTexts(const Input& input);
+bool useScript(const Input& input);
 /// The bytes are no file but say which calls write some, in which order.
-void useCalls(const Input& input);
+bool useCalls(const Input& input);
 
 }  // namespace nephele::fuzz

@@ -1,13 +1,15 @@
 // One program for all formats: `nephele_fuzz --format=obj [libFuzzer's options] [corpus]`. Of files to begin
-// from it writes changes that are the same every time, `--format=obj --write-inputs=FOLDER --seeds=FOLDER
-// --count=300`.
+// from, which must be readable, it writes changes that are the same every time,
+// `--format=obj --write-inputs=FOLDER --seeds=FOLDER --count=300`.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 
 #include "nephele/modeling/base/system.h"
@@ -49,10 +51,35 @@ const Format* formatCalled(std::string_view name) {
   return nullptr;
 }
 
+struct InputsUsed {
+  std::uint64_t read = 0, all = 0;
+  /// In the words of libFuzzer's own statistics.
+  ~InputsUsed() {
+    if (all > 0)
+      std::fprintf(stderr, "stat::inputs_that_were_read:   %llu\n", static_cast<unsigned long long>(read));
+  }
+} inputsUsed;
+
 std::uint64_t hashOf(std::string_view bytes) {
   std::uint64_t hash = 14695981039346656037u;
   for (const char c : bytes) hash = (hash ^ std::uint8_t(c)) * 1099511628211u;
   return hash ^ (hash >> 29);
+}
+
+bool use(std::string_view bytes) {
+  const Input input{scratchPath(fmt::format("input{}", chosen->extension)), bytes, hashOf(bytes)};
+  std::ofstream(input.path, std::ios::binary | std::ios::trunc) << bytes;
+  setInput(bytes);
+  return chosen->use(input);
+}
+
+/// Changes of a file that cannot be read say nothing of its reader.
+void requireReadable(const std::string& seeds) {
+  for (const auto& entry : std::filesystem::directory_iterator(seeds)) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    expect(use(bytes), fmt::format("{} cannot be read: {}", entry.path().string(), lastError()));
+  }
 }
 
 }  // namespace
@@ -91,6 +118,7 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     std::exit(2);
   }
   if (!inputs.empty()) {
+    requireReadable(seeds);
     writeFixedInputs(*chosen, seeds, inputs, count);
     std::exit(0);
   }
@@ -100,11 +128,8 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace nephele::fuzz;
-  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  const Input input{scratchPath(fmt::format("input{}", chosen->extension)), bytes, hashOf(bytes)};
-  std::ofstream(input.path, std::ios::binary | std::ios::trunc) << bytes;
-  setInput(bytes);
-  chosen->use(input);
+  ++inputsUsed.all;
+  if (use({reinterpret_cast<const char*>(data), size})) ++inputsUsed.read;
   return 0;
 }
 

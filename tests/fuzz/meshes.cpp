@@ -89,16 +89,17 @@ void runVerbs(const Input& input) {
 
 }  // namespace
 
-void useMesh(const Input& input) {
+bool useMesh(const Input& input) {
   succeeds(input.path, [&] { requireValid(readPoints(input.path)); });
   Mesh mesh;
-  if (!succeeds(input.path, [&] { mesh = readMesh(input.path); })) return;
+  if (!succeeds(input.path, [&] { mesh = readMesh(input.path); })) return false;
   requireValid(mesh);
   diagnose(mesh);
-  if (mesh.corners.size() > kMostCorners) return;
+  if (mesh.corners.size() > kMostCorners) return true;
   succeeds(input.path, [&] { apps::describeFile(input.path); });
   writeAndReadBack(mesh, input.hash);
   runVerbs(input);
+  return true;
 }
 
 }  // namespace nephele::fuzz

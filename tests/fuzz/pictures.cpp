@@ -61,13 +61,13 @@ void runVerbs(const Input& input) {
 
 }  // namespace
 
-void usePicture(const Input& input) {
+bool usePicture(const Input& input) {
   runVerb({"info", input.path}, input.path);
   succeeds(input.path, [&] { readImageCamera(input.path); });
   Image image;
-  if (!succeeds(input.path, [&] { image = readImage(input.path, kMostBytes); })) return;
+  if (!succeeds(input.path, [&] { image = readImage(input.path, kMostBytes); })) return false;
   image.check();
-  if (image.width > 1024 || image.height > 1024 || image.channels.size() > 64) return;
+  if (image.width > 1024 || image.height > 1024 || image.channels.size() > 64) return true;
   succeeds(input.path, [&] {
     Texture(readLinearImage(input.path, ColourEncoding::automatic, kMostBytes)).at(0.3, 0.7, 2.5);
   });
@@ -80,14 +80,15 @@ void usePicture(const Input& input) {
   succeeds("", [&] { screenBytes(image, {}); });
   writeAndReadBack(std::move(image));
   runVerbs(input);
+  return true;
 }
 
-void useDeepPicture(const Input& input) {
+bool useDeepPicture(const Input& input) {
   runVerb({"info", input.path}, input.path);
   DeepImage image;
-  if (!succeeds(input.path, [&] { image = readDeepExr(input.path, kMostBytes); })) return;
+  if (!succeeds(input.path, [&] { image = readDeepExr(input.path, kMostBytes); })) return false;
   image.check();
-  if (image.width > 256 || image.height > 256 || image.sampleCount() > 1e5) return;
+  if (image.width > 256 || image.height > 256 || image.sampleCount() > 1e5) return true;
   for (const auto& samples : image.pixels) flattened(samples);
   const std::string path = scratchPath("again.exr");
   if (succeeds(path, [&] { writeDeepExr(path, image, ImageCamera{}); })) {
@@ -105,6 +106,7 @@ void useDeepPicture(const Input& input) {
     runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", size, "--samples", "1", "--octaves",
              "1", "--aov", "none", "--shadows", "deep", "--read-deep-shadow", input.path},
             input.path);
+  return true;
 }
 
 }  // namespace nephele::fuzz

@@ -2,7 +2,7 @@
 # run.sh PROGRAM FOLDER SECONDS [FORMAT...]: fuzzes each format for so long, as many at once as there are processors, and says
 # how many inputs it ran. It begins with what PROGRAM_seeds writes. What it learns stays in FOLDER/corpus and is where the next run
 # begins; inputs that broke something are in FOLDER/findings, and FOLDER/history has a line for every run: format, seconds of a
-# processor, inputs, findings.
+# processor, inputs, how many of them could be read, findings.
 # FUZZ_FILES: further files to begin from, folders of files that are sorted by their extensions.
 # SECONDS of 0: the same inputs every time, the files to begin from and our own changes of them; their checksum is said.
 set -eu
@@ -36,12 +36,12 @@ done
 inputs_of() {
   case $1 in
     deep) echo 150 ;;
-    exr | nvdb | obj | ocio) echo 300 ;;
+    exr | nvdb | obj | ocio | vdb) echo 300 ;;
     hdr) echo 400 ;;
     ply | stl | png) echo 600 ;;
-    chan | gltf | off | vdb) echo 1000 ;;
-    glb) echo 1500 ;;
-    camera | toml | field) echo 3000 ;;
+    chan | field | gltf | off) echo 1000 ;;
+    glb | toml) echo 1500 ;;
+    camera) echo 3000 ;;
     *) echo 6000 ;;
   esac
 }
@@ -68,11 +68,13 @@ fuzz() {
     -print_final_stats=1 $dictionary -artifact_prefix="$folder/findings/$format-" \
     "$corpus" $inputs "$folder/seeds/$format" > "$folder/logs/$format.log" 2>&1 && state="none" || state="FOUND"
   # In lines that are written whole, as formats end at any time.
-  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$folder/logs/$format.log")
+  stat() { sed -n "s/^stat::$1: *//p" "$folder/logs/$format.log"; }
+  runs=$(stat number_of_executed_units) read=$(stat inputs_that_were_read)
   times > "$folder/logs/$format.times"
   busy=$(sed 's/[ms]/ /g' "$folder/logs/$format.times" | awk 'NR == 2 { printf "%d", 60 * $1 + $2 + 60 * $3 + $4 }')
-  printf '%-8s %9s inputs in %s s%s, findings: %s\n' "$format" "${runs:-?}" "$busy" "$same" "$state"
-  printf '%s %s %s %s\n' "$format" "$busy" "${runs:-0}" "$state" >> "$folder/history"
+  printf '%-8s %9s inputs, %s of them read, in %s s%s, findings: %s\n' \
+    "$format" "${runs:-?}" "${read:-?}" "$busy" "$same" "$state"
+  printf '%s %s %s %s %s\n' "$format" "$busy" "${runs:-0}" "${read:-0}" "$state" >> "$folder/history"
   [ "$state" = none ]
 }
 

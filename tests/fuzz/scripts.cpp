@@ -35,6 +35,12 @@ const Registry& pureFunctions() {
   return *registry;
 }
 
+/// What a field's expression may speak of.
+const std::vector<felt::Given>& given() {
+  static const std::vector<felt::Given> place{{"P", {felt::Kind::vectorField}, identity()}};
+  return place;
+}
+
 bool formatsAlike(const std::string& text) {
   const std::string once = felt::formattedScript("script", text);
   return felt::formattedScript("script", once) == once;
@@ -49,34 +55,37 @@ void run(const std::string& text) {
   context.limits.depth = 40;
   std::size_t printed = 0;
   context.print = [&](const std::string& line) { printed += line.size(); };
-  const std::vector<felt::Given> given{{"P", {felt::Kind::vectorField}, identity()}};
-  const felt::Program program("script", text, pureFunctions(), given);
+  const felt::Program program("script", text, pureFunctions(), given());
   for (const felt::Diagnostic& warning : program.warnings()) felt::formatted(warning, program.sources());
   program.run(context);
 }
 
 }  // namespace
 
-void useScript(const Input& input) {
+bool useScript(const Input& input) {
   const std::string text(input.bytes);
   try {
     expect(formatsAlike(text), "formatting again changes something");
   } catch (const felt::ScriptError&) {
   }
   // There are no files beside the script that it could import.
-  if (text.find("import") != std::string::npos) return;
+  if (text.find("import") != std::string::npos) return true;
+  bool isScript = true;
   try {
-    const felt::Program program("script", text, allFunctions());
+    const felt::Program program("script", text, allFunctions(), given());
   } catch (const felt::ScriptError& error) {
     expect(!error.diagnostics().empty() && !error.json().empty(), "a script is refused without a fault");
+    isScript = false;
+    lastError() = error.what();
   }
   // Layers on layers take longer with each of them, and tiles of noise take a tenth of a second.
   for (const char* slow : {"eval", "fft"})
-    if (text.find(slow) != std::string::npos) return;
+    if (text.find(slow) != std::string::npos) return isScript;
   try {
     run(text);
   } catch (const felt::ScriptError&) {
   }
+  return isScript;
 }
 
 }  // namespace nephele::fuzz

@@ -212,10 +212,11 @@ void writeVolumeSeeds(const std::string& parent) {
     file.setCompression(compression);
     file.write(grids);
     // Files are numbered at random, and seeds are to be the same every time.
-    constexpr int kNumberPlace = 21, kNumberSize = 36;
+    constexpr int kNumberPlace = 21;
+    constexpr std::string_view kNumber = "00000000-0000-0000-0000-000000000000";
     std::fstream(vdb.file(name), std::ios::binary | std::ios::in | std::ios::out)
         .seekp(kNumberPlace)
-        .write(std::string(kNumberSize, '0').data(), kNumberSize);
+        .write(kNumber.data(), kNumber.size());
   };
   using namespace openvdb::io;
   write("fog_none.vdb", {fog}, COMPRESS_NONE);
@@ -297,7 +298,6 @@ void writePictureSeeds(const std::string& parent) {
     for (std::size_t k = 0; k < i % 4; ++k)
       samples.pixels[i].push_back({float(k), float(k) + 0.5f, 0.25f, {0.1f, 0.2f, 0.1f * float(i)}});
   writeDeepExr(deep.file("deep.exr"), samples, ImageCamera{});
-  writeExr(deep.file("flat.exr"), image, ImageCamera{});
   writePng(png.file("picture.png"), image, {}, {{"note", "text"}});
   std::string flat = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n-Y 2 +X 4\n";
   for (int i = 0; i < 8; ++i) flat += {char(i * 30), char(200 - i), 9, char(128 + i % 3)};
@@ -329,7 +329,7 @@ void writeScriptSeeds(const std::string& parent) {
              "scalarfield l = union(sphere((0,0,0), 1), box((1,0,0), (1,1,1))) + 0.1 * abs(perlin(4));\n"
              "vectorfield n = -grad(l) / sqrt(grad(l) * grad(l)); matrixfield h = grad(grad(l));\n"
              "domain d((-1,-1,-1), (2,2,2), (0,0,0), 0.5, 0.5, 0.5); scalarcache c(d);\n"
-             "scalarfield f = (mask(l) * l.x - n[1]) ^ 0.5 + n * h * n; bool b = 1.0 / 3 < 7 / 2;\n");
+             "scalarfield f = (mask(l) * n.x - n[1]) ^ 0.5 + n * h * n; bool b = 1.0 / 3 < 7 / 2;\n");
 }
 
 void writeViewConfigSeeds(const std::string& parent) {
@@ -439,19 +439,24 @@ void writeTextSeeds(const std::string& parent) {
   toml.write(
       "layers.toml",
       "[[layer]]\nnoise = \"worley\"\namplitude = \"3%\"\nfrequency = \"4x\"\nbillow = 0.5\n\n[[layer]]\n"
-      "amplitude = \"height:0=1%,0.6=3%\"\nmask = \"facing(0,1,0):0,1\"\nseed = 7\noctaves = 3\ntime = 0.5\n"
+      "amplitude = \"height:0=1%,0.6=3%\"\nmask = \"facing:0,1,0:-1=0,1=1\"\nseed = 7\noctaves = 3\ntime = "
+      "0.5\n"
       "direction = [0, 1, 0]\nbias = 0.4\n");
   toml.write("config.toml",
-             "resolution = 64\nlayers = 3\namplitude = \"2%\"\nsun = [\"30,20\", \"a=10,5\"]\nquiet = "
-             "true\nsize = \"64x48\"\n");
+             "[cloud]\nresolution = 64\nlayers = 3\namplitude = \"2%\"\nbillow = "
+             "\"=clamp(height, 0, 1)\"\n\n[render]\nsun = [\"30,20\", \"a=10,5\"]\nsize = \"64x48\"\n");
   field.write("ramp.txt", "height:0=1%,0.6=3%");
-  field.write("along.txt", "along(1,0.5,0):0.1,0.9");
-  field.write("facing.txt", "facing(0,1,0):0,1");
+  field.write("along.txt", "along:1,0.5,0:0=0.1,1=0.9");
+  field.write("facing.txt", "facing:0,1,0:-1=0,1=1");
+  field.write("product.txt", "height:0=1%,1=2%*noise:6x,3:0.5,1");
+  field.write("expression.txt", "=clamp(0.3 * height + facing((0, 1, 0)) * P.x, 0, 1)");
+  field.write("constant.txt", "0.5,0,1%");
   field.write("noise.txt", "noise:kind=perlin,amplitude=2%,frequency=6x,octaves=3,seed=1");
   field.write("curl.txt", "curl:amplitude=0.1,frequency=2,lacunarity=2.1,roughness=0.5,time=3");
-  field.write("options.txt",
-              "--resolution\n64\n--amplitude\n2.5%\n--billow\n0.5\n-o\na.vdb\n--sun\n30,20,3\n--size=64x48");
-  field.write("cut.txt", "a.obj\n-o\npieces\n--plane\n0,0,0,1,0,0\n--kerf\n1%\n--random-planes\n4");
+  field.write(
+      "options.txt",
+      "cloud\n--resolution\n64\n--amplitude\n2.5%\n--billow\n0.5\n-o\na.vdb\n--sun\n30,20,3\n--size=64x48");
+  field.write("cut.txt", "cut\na.obj\n-o\npieces\n--plane\n0,0,0,1,0,0\n--kerf\n1%\n--random-planes\n4");
   std::string bytes(256, '\0');
   for (std::size_t kind = 0; kind < 5; ++kind) {
     for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = char(i * (2 * kind + 1) + kind);

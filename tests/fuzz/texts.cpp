@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -32,16 +33,20 @@ class SilentRun : public apps::Run {
   void result(const std::string&) const override {}
 };
 
-/// A fault of usage is an answer, too. The program shows messages as printable text.
+/// A fault of usage is an answer, too. The program shows messages as printable text. Returns whether there
+/// was none.
 template <class Work>
-void mayFail(std::string_view named, const Work& work) {
+bool mayFail(std::string_view named, const Work& work) {
   try {
     work();
+    return true;
   } catch (const CLI::ParseError& error) {
-    checkMessage(printable(error.what()), named);
+    lastError() = printable(error.what());
   } catch (const Error& error) {
-    checkMessage(printable(error.what()), named);
+    lastError() = printable(error.what());
   }
+  checkMessage(lastError(), named);
+  return false;
 }
 
 const Mesh& mesh() {
@@ -77,6 +82,27 @@ const std::vector<std::string>& verbNames() {
   return names;
 }
 
+/// Arguments that a verb cannot do without, and an output.
+std::vector<std::string> needed(const apps::Verb& verb) {
+  CLI::App app(verb.summary, verb.name);
+  const apps::BoundVerb bound = verb.bind(app);
+  std::vector<std::string> arguments;
+  for (const CLI::Option* option : app.get_options(
+           [](const CLI::Option* each) { return each->get_required() || each->get_name() == "--output"; })) {
+    const std::string name = option->get_name();
+    if (!option->get_positional()) arguments.push_back(name);
+    const bool isPicture = verb.name == "render" || verb.name == "turntable";
+    const bool isVolume = verb.name != "mesh" && verb.name != "transfer";
+    arguments.push_back(name == "action"     ? "check"
+                        : name == "--frames" ? "1-2"
+                        : name != "--output" ? "a.obj"
+                        : isPicture          ? "a.exr"
+                        : isVolume           ? "a.vdb"
+                                             : "b.obj");
+  }
+  return arguments;
+}
+
 void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
   CLI::App app(verb.summary, verb.name);
   const apps::BoundVerb bound = verb.bind(app);
@@ -94,9 +120,9 @@ void useCameraMotion(const CameraMotion& motion) {
 
 }  // namespace
 
-void useCamera(const Input& input) {
+bool useCamera(const Input& input) {
   std::optional<CameraMotion> motion;
-  if (!succeeds(input.path, [&] { motion = readCameraFile(input.path); })) return;
+  if (!succeeds(input.path, [&] { motion = readCameraFile(input.path); })) return false;
   useCameraMotion(*motion);
   std::string text;
   if (succeeds("", [&] { text = cameraJsonText(*motion); }))
@@ -106,29 +132,34 @@ void useCamera(const Input& input) {
     expect(succeeds("", [&] { parseChan(text, "again"); }),
            "a camera that was written cannot be read: " + text);
   // What options take.
-  if (std::abs(motion->firstFrame()) > 1e9) return;
+  if (std::abs(motion->firstFrame()) > 1e9) return true;
   runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", "4x3", "--samples", "1", "--octaves",
            "1", "--aov", "none", "--camera", input.path, "--frame", fmt::format("{}", motion->firstFrame())},
           "");
+  return true;
 }
 
 /// Faults that are shown in the text of the file are of several lines, by a printer of its own.
 template <class Use>
-void mayFailOrShow(std::string_view named, const Use& use) {
-  mayFail(named, [&] {
+bool mayFailOrShow(std::string_view named, const Use& use) {
+  bool isShown = false;
+  const bool succeeded = mayFail(named, [&] {
     try {
       use();
     } catch (const felt::ScriptError& error) {
       expect(!error.diagnostics().empty(), "a text is refused without a fault");
       expect(std::string_view(error.what()).find(named) != std::string_view::npos,
              fmt::format("{} is not named: {}", named, error.what()));
+      isShown = true;
+      lastError() = error.what();
     }
   });
+  return succeeded && !isShown;
 }
 
-void useToml(const Input& input) {
+bool useToml(const Input& input) {
   const SilentRun run;
-  mayFailOrShow(input.path, [&] {
+  bool isRead = mayFailOrShow(input.path, [&] {
     const auto recipes = apps::readLayerRecipe(input.path);
     apps::FieldSources fields = sources(run);
     for (const CumuloLayer& layer : apps::recipeLayers(recipes, CumuloFractal{}, fields)) {
@@ -137,31 +168,35 @@ void useToml(const Input& input) {
     }
   });
   const apps::Verb& verb = verbs()[input.hash % verbs().size()];
-  mayFailOrShow("", [&] { parse(verb, {"--config", input.path}); });
+  std::vector<std::string> arguments = needed(verb);
+  arguments.insert(arguments.end(), {"--config", input.path});
+  isRead = mayFailOrShow("", [&] { parse(verb, arguments); }) || isRead;
   mayFailOrShow(input.path, [&] {
     CLI::App fresh("", verb.name);
     const apps::BoundVerb bound = verb.bind(fresh);
     apps::checkConfigFile({fresh, verb.name, verbNames()}, {"--config", input.path}, fresh);
   });
+  return isRead;
 }
 
-void useFieldTexts(const Input& input) {
+bool useFieldTexts(const Input& input) {
   const std::string text(input.bytes);
   const SilentRun run;
   using Unit = apps::Quantity::Unit;
-  const Unit unit = input.hash % 3 == 0 ? Unit::number : input.hash % 3 == 1 ? Unit::length : Unit::frequency;
-  mayFailOrShow("--value", [&] {
-    const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
-    apps::FieldSources fields = sources(run);
-    sample(fields.field(value));
-  });
+  bool isRead = false;
+  for (const Unit unit : {Unit::number, Unit::length, Unit::frequency})
+    isRead = isRead || mayFailOrShow("--value", [&] {
+               const auto value = apps::parseFieldValue("--value", text, {unit, -1, 1e6});
+               apps::FieldSources fields = sources(run);
+               sample(fields.field(value));
+             });
   // A file is named by itself.
-  mayFail(isVolumeFile(text) ? printable(text) : "--velocity", [&] {
+  isRead |= mayFail(isVolumeFile(text) ? printable(text) : "--velocity", [&] {
     apps::VelocityArguments velocity;
     apps::parseVelocity("--velocity", text, velocity);
     sample(velocity.field(1.0));
   });
-  mayFail("--wedge", [&] {
+  isRead |= mayFail("--wedge", [&] {
     CLI::App app("", "cloud");
     const apps::BoundVerb bound = apps::cloudVerb().bind(app);
     std::vector<std::string> words{"-o", "a.vdb", "--wedge", "seed=" + text};
@@ -185,8 +220,15 @@ void useFieldTexts(const Input& input) {
   }
   // CLI11 takes the first line of usage faults apart by itself; a file is not asked for.
   for (const std::string& line : lines)
-    if (line.find("config") != line.npos) return;
-  mayFail("", [&] { parse(verbs()[input.hash / 3 % verbs().size()], lines); });
+    if (line.find("config") != line.npos) return isRead;
+  std::size_t verb = input.hash / 3 % verbs().size();
+  if (!lines.empty())
+    if (const auto named = std::ranges::find(verbNames(), lines.front()); named != verbNames().end()) {
+      verb = std::size_t(named - verbNames().begin());
+      lines.erase(lines.begin());
+    }
+  isRead |= mayFail("", [&] { parse(verbs()[verb], lines); });
+  return isRead;
 }
 
 }  // namespace nephele::fuzz

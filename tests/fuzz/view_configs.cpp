@@ -9,7 +9,7 @@
 
 namespace nephele::fuzz {
 
-void useViewConfig(const Input& input) {
+bool useViewConfig(const Input& input) {
   // Tables that were read under the same name before.
   OCIO_NAMESPACE::ClearAllCaches();
   constexpr std::string_view kEnd = "\n...\n";
@@ -22,7 +22,7 @@ void useViewConfig(const Input& input) {
   constexpr const char* kViews[] = {"", "Half", "screen/Film", "Log"};
   const std::string name = kViews[input.hash % std::size(kViews)];
   ViewTransform view;
-  if (!succeeds(input.path, [&] { view.configView = readConfigView(input.path, name); })) return;
+  if (!succeeds(input.path, [&] { view.configView = readConfigView(input.path, name); })) return false;
   constexpr float kLargest = std::numeric_limits<float>::max(),
                   kInfinity = std::numeric_limits<float>::infinity();
   Image image{.width = 8, .height = 1, .channels = {}};
@@ -35,6 +35,7 @@ void useViewConfig(const Input& input) {
            "4x3", "--samples", "1", "--octaves", "1", "--aov", "none", "--ocio-config", input.path,
            "--view-transform", "Half"},
           input.path);
+  return true;
 }
 
 }  // namespace nephele::fuzz

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "nephele/levelset/grid/grid_field.h"
@@ -19,15 +20,20 @@ void sample(const ScalarField& field, const Box& box) {
   field.range(box);
 }
 
-void useGrid(const VdbGrid& grid, const std::string& path) {
+/// Verbs walk through the bricks of the box between voxels, however few they are.
+bool isSmall(const VdbGrid& grid) {
+  constexpr double kMostBricks = 1 << 20;
+  const VdbGridInfo info = describe(grid);
+  double bricks = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    bricks *= (double(info.indexMax[axis]) - info.indexMin[axis]) / kBrickSide + 2;
+  return info.memoryBytes < (1 << 24) && bricks <= kMostBricks;
+}
+
+void useGrid(const VdbGrid& grid) {
   const VdbGridInfo info = describe(grid);
   expect(info.indexMin.x <= info.indexMax.x || info.activeVoxels == 0, "active voxels without a box");
-  if (info.activeVoxels > kMostVoxels) return;
-  const auto extent = [](int low, int high) { return double(high) - low; };
-  // Bricks span the box of what is active.
-  if (std::max({extent(info.indexMin.x, info.indexMax.x), extent(info.indexMin.y, info.indexMax.y),
-                extent(info.indexMin.z, info.indexMax.z)}) > 1e4)
-    return;
+  if (info.activeVoxels > kMostVoxels || !isSmall(grid)) return;
   if (valuesOf(grid) == VdbValues::scalar)
     succeeds("", [&] { sample(gridField(toBricks(grid)), activeBox(grid)); });
   if (valuesOf(grid) == VdbValues::vector) {
@@ -36,7 +42,6 @@ void useGrid(const VdbGrid& grid, const std::string& path) {
     });
     succeeds("", [&] { toVectorVoxels(grid); });
   }
-  static_cast<void>(path);
 }
 
 /// What is written is read again as it was.
@@ -120,19 +125,16 @@ void runVerbs(const Input& input) {
 
 }  // namespace
 
-void useVolume(const Input& input) {
+bool useVolume(const Input& input) {
   succeeds(input.path, [&] { readVdbHeaders(input.path); });
   runVerb({"info", input.path}, input.path);
   std::vector<VdbGrid> grids;
-  if (!succeeds(input.path, [&] { grids = readVdbFile(input.path); })) return;
-  bool isSmall = true;
-  for (const VdbGrid& grid : grids) {
-    useGrid(grid, input.path);
-    isSmall = isSmall && describe(grid).memoryBytes < (1 << 24);
-  }
-  if (!isSmall) return;
+  if (!succeeds(input.path, [&] { grids = readVdbFile(input.path); })) return false;
+  for (const VdbGrid& grid : grids) useGrid(grid);
+  if (!std::ranges::all_of(grids, isSmall)) return true;
   writeAndReadBack(grids);
   runVerbs(input);
+  return true;
 }
 
 }  // namespace nephele::fuzz

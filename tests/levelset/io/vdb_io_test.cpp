@@ -247,6 +247,7 @@ TEST(VdbIo, RefusesTwoGridsOfOneNameInOneLine) {
               writeVdbFile(path, {grid, grid}, {});
             }),
             path + ": two grids are called 'smoke\\n2'");
+  EXPECT_EQ(messageOf([&] { requireWritable({grid, grid}); }), "two grids are called 'smoke\\n2'");
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
