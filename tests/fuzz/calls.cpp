@@ -35,11 +35,14 @@ Mesh anyMesh(Calls& calls) {
   const auto vertices = calls.ConsumeIntegralInRange<std::uint32_t>(0, 12);
   for (std::uint32_t i = 0; i < vertices; ++i)
     mesh.positions.push_back({anyFloat(calls), anyFloat(calls), calls.ConsumeFloatingPoint<double>()});
-  for (int faces = calls.ConsumeIntegralInRange(0, 12); faces > 0; --faces) {
-    std::vector<std::uint32_t> face(calls.ConsumeIntegralInRange<std::size_t>(0, 6));
+  // Valid ones mostly, as what is not goes no further.
+  const auto seldom = [&] { return calls.ConsumeIntegral<std::uint8_t>() == 1; };
+  for (int faces = calls.ConsumeIntegralInRange(0, 12); faces > 0 && vertices > 0; --faces) {
+    const bool isThin = seldom();
+    std::vector<std::uint32_t> face(
+        calls.ConsumeIntegralInRange<std::size_t>(isThin ? 0 : 3, isThin ? 2 : 6));
     for (std::uint32_t& corner : face)
-      corner = calls.ConsumeIntegralInRange<std::uint32_t>(
-          0, vertices + (calls.ConsumeIntegral<std::uint8_t>() == 0));
+      corner = calls.ConsumeIntegralInRange<std::uint32_t>(0, vertices - 1) + (seldom() ? vertices : 0);
     mesh.addFace(face);
   }
   for (int count = calls.ConsumeIntegralInRange(0, 3); count > 0; --count) {
@@ -62,24 +65,25 @@ Mesh anyMesh(Calls& calls) {
   return mesh;
 }
 
-void writeMeshes(Calls& calls) {
+bool writeMeshes(Calls& calls) {
   const Mesh mesh = anyMesh(calls);
   const std::string path = scratchPath(calls.PickValueInArray({"a.obj", "a.ply", "a.stl"}));
   std::filesystem::remove(path);
   if (!succeeds("", [&] { requireValid(mesh); })) {
     expect(!succeeds("", [&] { writeMesh(path, mesh); }), "a mesh that is not valid was written");
-    return;
+    return false;
   }
   if (!succeeds(path, [&] { writeMesh(path, mesh); })) {
     expect(!std::filesystem::exists(path), "a mesh that could not be written left a file");
-    return;
+    return false;
   }
   Mesh back;
   const bool isRead = succeeds(path, [&] { back = readMesh(path); });
-  if (path.ends_with(".stl")) return;
+  if (path.ends_with(".stl")) return isRead;
   expect(isRead || mesh.faceCount() == 0, "a mesh that was written cannot be read: " + lastError());
   if (isRead)
     expect(back.corners == mesh.corners && back.faceStart == mesh.faceStart, "other faces are read");
+  return isRead;
 }
 
 VoxelGrid<float> anyVoxels(Calls& calls) {
@@ -102,7 +106,7 @@ VoxelGrid<float> anyVoxels(Calls& calls) {
   return voxels;
 }
 
-void writeVolumes(Calls& calls) {
+bool writeVolumes(Calls& calls) {
   const std::string path = scratchPath("a.vdb");
   std::filesystem::remove(path);
   std::vector<VdbGrid> grids;
@@ -117,10 +121,10 @@ void writeVolumes(Calls& calls) {
       if (grids.size() > 1 && calls.ConsumeBool()) copyMetadata(grids[0], grids.back());
     }
   });
-  if (grids.empty()) return;
+  if (grids.empty()) return false;
   if (!succeeds(path, [&] { writeVdbFile(path, grids, {{anyName(calls), anyName(calls)}}); })) {
     expect(!std::filesystem::exists(path), "a volume that could not be written left a file");
-    return;
+    return false;
   }
   std::vector<VdbGrid> back;
   expect(succeeds(path, [&] { back = readVdbFile(path); }),
@@ -130,9 +134,10 @@ void writeVolumes(Calls& calls) {
     expect(describe(back[i]).activeVoxels == describe(grids[i]).activeVoxels, "other voxels are active");
     succeeds("", [&] { toBricks(back[i]); });
   }
+  return true;
 }
 
-void writePictures(Calls& calls) {
+bool writePictures(Calls& calls) {
   Image image{.width = calls.ConsumeIntegralInRange(0, 9), .height = calls.ConsumeIntegralInRange(0, 9)};
   if (calls.ConsumeBool())
     image.display =
@@ -158,14 +163,15 @@ void writePictures(Calls& calls) {
       writeExr(path, image, ImageCamera{}, metadata);
   });
   expect(isWritten == std::filesystem::exists(path), "a picture that could not be written left a file");
-  if (!isWritten) return;
+  if (!isWritten) return false;
   Image back;
   expect(succeeds(path, [&] { back = readImage(path); }),
          "a picture that was written cannot be read: " + lastError());
   expect(back.width == image.width && back.height == image.height, "a picture has another size");
+  return true;
 }
 
-void writeDeepPictures(Calls& calls) {
+bool writeDeepPictures(Calls& calls) {
   DeepImage image{.width = calls.ConsumeIntegralInRange(0, 5),
                   .height = calls.ConsumeIntegralInRange(0, 5),
                   .pixels = {}};
@@ -179,15 +185,16 @@ void writeDeepPictures(Calls& calls) {
   const bool isValid = succeeds("", [&] { image.check(); });
   const bool isWritten = succeeds(isValid ? path : "", [&] { writeDeepExr(path, image, ImageCamera{}); });
   expect(isWritten == std::filesystem::exists(path), "a deep picture that could not be written left a file");
-  if (!isWritten) return;
+  if (!isWritten) return false;
   DeepImage back;
   expect(succeeds(path, [&] { back = readDeepExr(path); }),
          "a deep picture that was written cannot be read: " + lastError());
   expect(back.sampleCount() == image.sampleCount(), "a deep picture has other samples");
+  return true;
 }
 
 /// Files that are begun, committed, withdrawn and given up in any order are there whole or not at all.
-void writeOutputs(Calls& calls) {
+bool writeOutputs(Calls& calls) {
   constexpr int kTargets = 2;
   std::vector<std::unique_ptr<OutputFile>> open(4);
   const auto target = [&] {
@@ -223,16 +230,16 @@ void writeOutputs(Calls& calls) {
     if (file >> text) expect(text == "whole", "a part of an output was left");
     std::filesystem::remove(path);
   }
+  return true;
 }
 
 }  // namespace
 
 bool useCalls(const Input& input) {
   Calls calls(reinterpret_cast<const std::uint8_t*>(input.bytes.data()), input.bytes.size());
-  constexpr void (*kKinds[])(Calls&) = {writeMeshes, writeVolumes, writePictures, writeDeepPictures,
+  constexpr bool (*kKinds[])(Calls&) = {writeMeshes, writeVolumes, writePictures, writeDeepPictures,
                                         writeOutputs};
-  calls.PickValueInArray(kKinds)(calls);
-  return true;
+  return calls.PickValueInArray(kKinds)(calls);
 }
 
 }  // namespace nephele::fuzz

@@ -48,7 +48,8 @@ bool useViewConfig(const Input& input);
 bool useToml(const Input& input);
 bool useFieldTexts(const Input& input);
 bool useScript(const Input& input);
-/// The bytes are no file but say which calls write some, in which order.
+/// The bytes are no file but say which calls write some, in which order. What can be read is what these have
+/// written.
 bool useCalls(const Input& input);
 
 }  // namespace nephele::fuzz

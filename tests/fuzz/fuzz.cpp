@@ -16,6 +16,7 @@
 #include "tests/fuzz/fixed_inputs.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
+#include "tests/fuzz/json_changes.h"
 #include "tests/fuzz/mutators.h"
 
 namespace nephele::fuzz {
@@ -26,7 +27,7 @@ constexpr Format kFormats[] = {
     {"ply", ".ply", useMesh},
     {"stl", ".stl", useMesh},
     {"off", ".off", useMesh},
-    {"gltf", ".gltf", useMesh},
+    {"gltf", ".gltf", useMesh, mutateJson},
     {"glb", ".glb", useMesh, mutateGlb},
     {"vdb", ".vdb", useVolume, mutateBlocks},
     {"nvdb", ".nvdb", useVolume, mutateNanoVdb},
@@ -35,7 +36,7 @@ constexpr Format kFormats[] = {
     {"hdr", ".hdr", usePicture},
     {"png", ".png", usePicture, mutatePng},
     {"chan", ".chan", useCamera},
-    {"camera", ".json", useCamera},
+    {"camera", ".json", useCamera, mutateJson},
     {"ocio", ".ocio", useViewConfig},
     {"toml", ".toml", useToml},
     {"field", ".txt", useFieldTexts},

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cstdio>
 #include <cstdlib>
@@ -119,6 +120,18 @@ bool runVerb(std::vector<std::string> arguments, std::string_view named) {
       message.find("this needs ") != message.npos || message.find(" cannot hold") != message.npos;
   checkMessage(message, isOfOutput ? "" : named);
   return false;
+}
+
+bool runRender(std::vector<std::string> arguments, std::string_view named) {
+  static const std::pair<std::string, std::string> least[] = {
+      {"--size", "4x3"}, {"--samples", "1"},       {"--octaves", "1"},
+      {"--aov", "none"}, {"--sky", "0.2,0.3,0.4"}, {"--light-quality", "draft"}};
+  arguments.insert(arguments.begin(), "render");
+  arguments.insert(arguments.end(), {"-o", scratchPath("out.exr")});
+  for (const auto& [option, value] : least)
+    if (std::ranges::find(arguments, option) == arguments.end())
+      arguments.insert(arguments.end(), {option, value});
+  return runVerb(std::move(arguments), named);
 }
 
 std::string scratchPath(std::string_view name) {

@@ -42,6 +42,10 @@ bool succeeds(std::string_view named, const Work& work) {
 /// not, its message must name `named`, and its output must not be there.
 bool runVerb(std::vector<std::string> arguments, std::string_view named);
 
+/// Runs `render` likewise, with its light and its few pixels made as fast as they can be where `arguments` do
+/// not say otherwise.
+bool runRender(std::vector<std::string> arguments, std::string_view named);
+
 /// A file in this process's own folder in memory.
 std::string scratchPath(std::string_view name);
 

@@ -67,9 +67,7 @@ void runVerbs(const Input& input) {
       runVerb({"wisps", path, "-o", volume, "--guides", "2", "--dots", "200", "--resolution", "8"}, path);
       break;
     case 7:
-      runVerb({"render", ballFog(), "--object", path, "-o", scratchPath("out.exr"), "--size", "4x3",
-               "--samples", "1", "--checker", "4"},
-              path);
+      runRender({ballFog(), "--object", path, "--checker", "4"}, path);
       break;
     case 8:
       runVerb({"transfer", "--from", ballMesh(), "--to", path, "-o", mesh, "--resolution", "8",

@@ -1,5 +1,6 @@
 #include "tests/fuzz/mutators.h"
 
+#include <blosc.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -7,6 +8,10 @@
 #include <cstring>
 #include <optional>
 #include <vector>
+
+#include "nephele/levelset/io/detail/blosc_header.h"
+#include "nephele/modeling/base/error.h"
+#include "tests/fuzz/json_changes.h"
 
 namespace nephele::fuzz {
 namespace {
@@ -33,26 +38,45 @@ std::uint32_t bigEndian(std::uint32_t value) {
 struct Stream {
   std::size_t begin = 0, size = 0;
   Data contents;
+  /// Of Blosc's elements; 0: zlib's.
+  std::size_t elementBytes = 0;
 };
 
-constexpr std::size_t kLargestContents = 1 << 20;
+constexpr std::size_t kLargestContents = 4 << 20;
+
+std::optional<Stream> bloscAt(const Data& data, std::size_t place) {
+  if (data[place] != BLOSC_VERSION_FORMAT || data.size() - place <= BLOSC_MIN_HEADER_LENGTH)
+    return std::nullopt;
+  const auto unpacked = numberAt<std::uint32_t>(data, place + 4),
+             packed = numberAt<std::uint32_t>(data, place + 12);
+  if (packed <= BLOSC_MIN_HEADER_LENGTH || packed > data.size() - place || unpacked > kLargestContents)
+    return std::nullopt;
+  const char* block = reinterpret_cast<const char*>(data.data()) + place;
+  try {
+    detail::checkBloscHeader(block, packed, unpacked);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+  Stream stream{place, packed, Data(unpacked), data[place + 3]};
+  if (blosc_decompress_ctx(block, stream.contents.data(), unpacked, 1) != int(unpacked)) return std::nullopt;
+  return stream;
+}
 
 std::optional<Stream> streamAt(const Data& data, std::size_t place) {
+  if (auto blosc = bloscAt(data, place)) return blosc;
   const unsigned head = unsigned(data[place]) << 8 | data[place + 1];
   if ((head & 0x8f00) != 0x0800 || head % 31 != 0) return std::nullopt;
   z_stream z{};
   if (inflateInit(&z) != Z_OK) return std::nullopt;
-  Stream stream{place, 0, Data(kLargestContents)};
+  static Data room(kLargestContents);
   z.next_in = const_cast<Bytef*>(data.data() + place);
   z.avail_in = uInt(data.size() - place);
-  z.next_out = stream.contents.data();
-  z.avail_out = uInt(stream.contents.size());
+  z.next_out = room.data();
+  z.avail_out = uInt(room.size());
   const int status = inflate(&z, Z_FINISH);
-  stream.size = z.total_in;
-  stream.contents.resize(z.total_out);
   inflateEnd(&z);
   if (status != Z_STREAM_END) return std::nullopt;
-  return stream;
+  return Stream{place, z.total_in, Data(room.begin(), room.begin() + std::ptrdiff_t(z.total_out))};
 }
 
 /// One of the file's compressed blocks, found by what zlib says of every place.
@@ -75,7 +99,26 @@ Data changed(Data data, std::size_t most, const ByteChange& change) {
   return data;
 }
 
-Data deflated(const Data& data) {
+/// Changes a few bytes somewhere in `data` and moves none of the others.
+Data changedInPlace(Data data, unsigned seed, const ByteChange& change) {
+  constexpr std::size_t kMost = 64;
+  if (data.empty()) return data;
+  const std::size_t begin = std::size_t(seed) * 2654435761u % data.size();
+  const std::size_t size = std::min({data.size() - begin, kMost, std::size_t(1) << seed % 7});
+  const auto part = data.begin() + std::ptrdiff_t(begin);
+  const Data after = changed(Data(part, part + std::ptrdiff_t(size)), size, change);
+  std::copy_n(after.begin(), std::min(after.size(), size), part);
+  return data;
+}
+
+Data packed(const Stream& stream, const Data& data) {
+  if (stream.elementBytes > 0) {
+    Data result(data.size() + BLOSC_MAX_OVERHEAD);
+    const int size = blosc_compress_ctx(5, BLOSC_SHUFFLE, stream.elementBytes, data.size(), data.data(),
+                                        result.data(), result.size(), BLOSC_LZ4_COMPNAME, 0, 1);
+    result.resize(std::size_t(std::max(size, 0)));
+    return result;
+  }
   uLongf size = compressBound(data.size());
   Data result(size);
   compress2(result.data(), &size, data.data(), data.size(), 6);
@@ -83,9 +126,12 @@ Data deflated(const Data& data) {
   return result;
 }
 
-/// What stands before a block and says how long it is.
+/// What stands before a block and says how long it is, alone and with that number.
 void correctLength(Data& data, const Stream& stream, std::size_t newSize) {
-  constexpr std::size_t kFurthest = 32;
+  constexpr std::size_t kNumber = sizeof(std::uint64_t), kFurthest = 32;
+  for (std::size_t place = 0; place + kNumber <= stream.begin; ++place)
+    if (numberAt<std::uint64_t>(data, place) == stream.size + kNumber)
+      setNumber(data, place, std::uint64_t(newSize + kNumber));
   const std::size_t from = stream.begin - std::min(stream.begin, kFurthest);
   for (std::size_t place = stream.begin; place-- > from;) {
     if (place + 8 <= stream.begin && numberAt<std::uint64_t>(data, place) == stream.size)
@@ -122,11 +168,10 @@ void replaceStream(Data& data, const Stream& stream, const Data& packed) {
 bool changeStream(Data& data, unsigned seed, const ByteChange& change) {
   const auto stream = anyStream(data, seed);
   if (!stream) return false;
-  // As long as before, mostly: blocks hold a known number of values.
-  const std::size_t most = seed % 8 == 0 ? stream->contents.size() + 64 : stream->contents.size();
-  Data contents = changed(stream->contents, most, change);
-  if (seed % 8 != 0) contents.resize(stream->contents.size());
-  replaceStream(data, *stream, deflated(contents));
+  // As long as before, mostly: blocks hold a known number of values, which stand where they are looked for.
+  const Data contents = seed % 8 == 0 ? changed(stream->contents, stream->contents.size() + 64, change)
+                                      : changedInPlace(stream->contents, seed / 8, change);
+  replaceStream(data, *stream, packed(*stream, contents));
   return true;
 }
 
@@ -172,11 +217,10 @@ std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed, const By
   Data data = first(bytes, size);
   if (auto stream = anyStream(data, seed / 4)) {
     switchOff(stream->contents);
-    Data contents = changed(stream->contents, stream->contents.size(), change);
-    contents.resize(stream->contents.size());
-    replaceStream(data, *stream, deflated(contents));
+    replaceStream(data, *stream, packed(*stream, changedInPlace(stream->contents, seed / 4, change)));
   } else {
-    data = changed(std::move(data), bytes.size(), change);
+    data = seed / 4 % 8 == 0 ? changed(std::move(data), bytes.size(), change)
+                             : changedInPlace(std::move(data), seed / 32, change);
     switchOff(data);
   }
   return store(bytes, size, data, change);
@@ -198,7 +242,10 @@ std::size_t mutateGlb(Bytes bytes, std::size_t size, unsigned seed, const ByteCh
   const std::size_t length = std::min<std::size_t>(numberAt<std::uint32_t>(data, kHeader), size - text);
   const auto middle = data.begin() + std::ptrdiff_t(text + length);
   Data json(data.begin() + std::ptrdiff_t(text), middle), rest(middle, data.end());
-  if (seed / 4 % 4 != 0)
+  if (seed / 4 % 4 > 1) {
+    const std::string after = changedJson({json.begin(), json.end()}, seed / 16, change);
+    json.assign(after.begin(), after.end());
+  } else if (seed / 4 % 4 == 1)
     json = changed(std::move(json), json.size() + 64, change);
   else
     rest = changed(std::move(rest), rest.size() + 64, change);

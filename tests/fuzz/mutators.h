@@ -9,8 +9,8 @@
 // that must agree. As Mutator.
 namespace nephele::fuzz {
 
-/// Changes what a zlib stream unpacks to, packs it again and corrects the length before it and all places in
-/// the file that are told from its start.
+/// Changes what a stream of zlib or Blosc unpacks to, packs it again and corrects the length before it and
+/// all places in the file that are told from its start.
 std::size_t mutateBlocks(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);
 /// The same, and switches checksums of NanoVDB grids off.
 std::size_t mutateNanoVdb(Bytes bytes, std::size_t size, unsigned seed, const ByteChange& change);

@@ -39,17 +39,13 @@ void writeAndReadBack(Image image) {
 }
 
 void runVerbs(const Input& input) {
-  const std::string &path = input.path, picture = scratchPath("out.exr");
+  const std::string& path = input.path;
   switch (input.hash % 3) {
     case 0:
-      runVerb({"render", ballFog(), "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1",
-               "--aov", "none", "--sky", path},
-              path);
+      runRender({ballFog(), "--sky", path}, path);
       break;
     case 1:
-      runVerb({"render", ballFog(), "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1",
-               "--aov", "none", "--object", ballMesh(), "--texture", path},
-              path);
+      runRender({ballFog(), "--object", ballMesh(), "--texture", path}, path);
       break;
     default:
       runVerb(
@@ -99,13 +95,9 @@ bool useDeepPicture(const Input& input) {
   }
   const std::string size = fmt::format("{}x{}", std::min(image.width, 16), std::min(image.height, 16));
   if (input.hash % 2 == 0)
-    runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", size, "--samples", "1", "--octaves",
-             "1", "--aov", "none", "--holdout", input.path},
-            input.path);
+    runRender({ballFog(), "--size", size, "--holdout", input.path}, input.path);
   else
-    runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", size, "--samples", "1", "--octaves",
-             "1", "--aov", "none", "--shadows", "deep", "--read-deep-shadow", input.path},
-            input.path);
+    runRender({ballFog(), "--size", size, "--shadows", "deep", "--read-deep-shadow", input.path}, input.path);
   return true;
 }
 

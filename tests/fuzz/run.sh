@@ -20,9 +20,8 @@ most=16k
 for files in "$here/../../data" ${FUZZ_FILES:-}; do
   for format in "$@"; do
     case $format in
-      camera) extension=json ;;
       deep) extension=exr ;;
-      field | calls) continue ;;
+      camera | field | calls) continue ;;
       *) extension=$format ;;
     esac
     mkdir -p "$folder/seeds/$format"
@@ -38,10 +37,9 @@ inputs_of() {
     deep) echo 150 ;;
     exr | nvdb | obj | ocio | vdb) echo 300 ;;
     hdr) echo 400 ;;
-    ply | stl | png) echo 600 ;;
-    chan | field | gltf | off) echo 1000 ;;
-    glb | toml) echo 1500 ;;
-    camera) echo 3000 ;;
+    camera | gltf | glb | ply | stl | png) echo 600 ;;
+    chan | field | off | toml) echo 1000 ;;
+    felt) echo 3000 ;;
     *) echo 6000 ;;
   esac
 }

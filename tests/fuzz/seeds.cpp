@@ -457,10 +457,13 @@ void writeTextSeeds(const std::string& parent) {
       "options.txt",
       "cloud\n--resolution\n64\n--amplitude\n2.5%\n--billow\n0.5\n-o\na.vdb\n--sun\n30,20,3\n--size=64x48");
   field.write("cut.txt", "cut\na.obj\n-o\npieces\n--plane\n0,0,0,1,0,0\n--kerf\n1%\n--random-planes\n4");
-  std::string bytes(256, '\0');
-  for (std::size_t kind = 0; kind < 5; ++kind) {
-    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = char(i * (2 * kind + 1) + kind);
-    calls.write(fmt::format("{}.bin", kind), bytes);
+  // By which meshes, volumes, pictures, deep pictures and outputs are written so that they can be read.
+  constexpr std::size_t kPatterns[][2] = {{3, 4},  {5, 1}, {3, 0}, {7, 4}, {21, 1},
+                                          {32, 3}, {1, 0}, {3, 2}, {1, 1}, {2, 2}};
+  for (const auto& [rise, first] : kPatterns) {
+    std::string bytes(256, '\0');
+    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = char(i * (2 * rise + 1) + i / 8 * rise + first);
+    calls.write(fmt::format("{}_{}.bin", rise, first), bytes);
   }
 }
 

@@ -133,9 +133,7 @@ bool useCamera(const Input& input) {
            "a camera that was written cannot be read: " + text);
   // What options take.
   if (std::abs(motion->firstFrame()) > 1e9) return true;
-  runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--size", "4x3", "--samples", "1", "--octaves",
-           "1", "--aov", "none", "--camera", input.path, "--frame", fmt::format("{}", motion->firstFrame())},
-          "");
+  runRender({ballFog(), "--camera", input.path, "--frame", fmt::format("{}", motion->firstFrame())}, "");
   return true;
 }
 

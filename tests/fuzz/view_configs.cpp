@@ -31,10 +31,9 @@ bool useViewConfig(const Input& input) {
     channel.values = {0, 1e-38f, 0.18f, 1, 65504, -0.5f, kLargest, kInfinity};
   for (const float value : displayed(image, view))
     expect(value >= 0 && value <= 1, "a view shows what no screen can: " + std::to_string(value));
-  runVerb({"render", ballFog(), "-o", scratchPath("out.exr"), "--preview", scratchPath("out.png"), "--size",
-           "4x3", "--samples", "1", "--octaves", "1", "--aov", "none", "--ocio-config", input.path,
-           "--view-transform", "Half"},
-          input.path);
+  runRender({ballFog(), "--preview", scratchPath("out.png"), "--ocio-config", input.path, "--view-transform",
+             "Half"},
+            input.path);
   return true;
 }
 

@@ -69,7 +69,6 @@ void writeAndReadBack(const std::vector<VdbGrid>& grids) {
 
 void runVerbs(const Input& input) {
   const std::string &path = input.path, volume = scratchPath("out.vdb"), mesh = scratchPath("out.obj");
-  const std::string picture = scratchPath("out.exr");
   switch (input.hash % 11) {
     case 0:
       runVerb({"mesh", path, "-o", mesh}, path);
@@ -78,14 +77,10 @@ void runVerbs(const Input& input) {
       runVerb({"mesh", path, "-o", mesh, "--adaptivity", "0.5"}, path);
       break;
     case 2:
-      runVerb({"render", path, "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1", "--aov",
-               "none"},
-              path);
+      runRender({path}, path);
       break;
     case 3:
-      runVerb({"render", ballFog(), path, "-o", picture, "--size", "4x3", "--samples", "1", "--octaves", "1",
-               "--aov", "none", "--integrator", "path"},
-              path);
+      runRender({ballFog(), path, "--integrator", "path"}, path);
       break;
     case 4:
       if (input.hash / 10 % 2 == 0)
@@ -106,9 +101,7 @@ void runVerbs(const Input& input) {
       break;
     }
     case 8:
-      runVerb({"render", ballFog(), "--object", path, "-o", picture, "--size", "4x3", "--samples", "1",
-               "--octaves", "1", "--aov", "none"},
-              path);
+      runRender({ballFog(), "--object", path}, path);
       break;
     case 9:
       runVerb({"transform", path, "-o", volume, "--to-up-axis", "z", "--unit",
