@@ -1,9 +1,11 @@
 #include <fmt/format.h>
+#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <filesystem>
 
 #include "nephele/levelset/grid/grid_field.h"
+#include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
@@ -20,14 +22,35 @@ void sample(const ScalarField& field, const Box& box) {
   field.range(box);
 }
 
+/// Around all leaves and tiles that are not background, as far as bricks are made of them.
+template <class Grid>
+openvdb::CoordBBox boxOf(const openvdb::GridBase& base) {
+  openvdb::CoordBBox box;
+  if (!base.isType<Grid>()) return box;
+  const auto& grid = static_cast<const Grid&>(base);
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) box.expand(leaf->getNodeBoundingBox());
+  auto tile = grid.tree().cbeginValueAll();
+  tile.setMaxDepth(tile.getLeafDepth() - 1);
+  for (; tile; ++tile)
+    if (*tile != grid.background()) {
+      openvdb::CoordBBox part;
+      tile.getBoundingBox(part);
+      box.expand(part);
+    }
+  return box;
+}
+
 /// Verbs walk through the bricks of the box between voxels, however few they are.
 bool isSmall(const VdbGrid& grid) {
-  constexpr double kMostBricks = 1 << 20;
-  const VdbGridInfo info = describe(grid);
+  constexpr double kMostBricks = 1 << 16;
+  const openvdb::GridBase& base = *grid.impl().grid;
+  openvdb::CoordBBox box = base.evalActiveVoxelBoundingBox();
+  for (const openvdb::CoordBBox& part : {boxOf<openvdb::FloatGrid>(base), boxOf<openvdb::DoubleGrid>(base)})
+    if (!part.empty()) box.expand(part);
+  if (box.empty()) return true;
   double bricks = 1;
-  for (int axis = 0; axis < 3; ++axis)
-    bricks *= (double(info.indexMax[axis]) - info.indexMin[axis]) / kBrickSide + 2;
-  return info.memoryBytes < (1 << 24) && bricks <= kMostBricks;
+  for (int axis = 0; axis < 3; ++axis) bricks *= (double(box.max()[axis]) - box.min()[axis]) / kBrickSide + 2;
+  return base.memUsage() < (1 << 24) && bricks <= kMostBricks;
 }
 
 void useGrid(const VdbGrid& grid) {
