@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -53,7 +54,7 @@ Film::Film(const Camera& camera, const std::vector<std::string>& lights,
     } else {
       std::string names;
       for (const std::string& name : layerNames()) names += (names.empty() ? "" : ", ") + name;
-      throw Error(fmt::format("aov: expected one of {}, got '{}'", names, layer));
+      throw Error(fmt::format("aov: expected one of {}, got '{}'", names, printable(layer, 60)));
     }
   }
 }

@@ -250,7 +250,8 @@ CameraMotion parseCameraJson(const std::string& text, const std::string& name) {
   }
   const std::string interpolation = top.text("interpolation", "smooth");
   if (interpolation != "smooth" && interpolation != "linear")
-    top.refuse("interpolation", "interpolation must be smooth or linear, not " + interpolation);
+    top.refuse("interpolation",
+               "interpolation must be smooth or linear, not " + printable(interpolation, 60));
   const double filmWidth = top.number("film_width").value_or(36.0);
   if (!(filmWidth > 0))
     top.refuse("film_width", fmt::format("film_width must be above 0, got {:g}", filmWidth));

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -75,7 +76,8 @@ void Lights::check() const {
   std::set<std::string> seen;
   for (const std::string& name : names()) {
     require(!name.empty() && name.find_first_of(". ,=") == std::string::npos,
-            fmt::format("light: expected a name without blanks, dots, commas and =, got '{}'", name));
+            fmt::format("light: expected a name without blanks, dots, commas and =, got '{}'",
+                        printable(name, 60)));
     require(seen.insert(name).second, fmt::format("light: the name '{}' is taken twice", name));
   }
 }

@@ -20,6 +20,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/math.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -236,7 +237,7 @@ Phase Phase::parse(const std::string& text) {
   } catch (const Error&) {
     // The list of forms below says more.
   }
-  throw Error(fmt::format("phase: expected {}; got '{}'", forms(), text));
+  throw Error(fmt::format("phase: expected {}; got '{}'", forms(), printable(text, 60)));
 }
 
 float Phase::operator()(float c) const {

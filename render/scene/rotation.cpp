@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -25,8 +26,9 @@ RotationOrder RotationOrder::parse(const std::string& name) {
     order.axes_[i] = std::tolower(static_cast<unsigned char>(name[i])) - 'x';
     if (order.axes_[i] >= 0 && order.axes_[i] < 3) seen |= 1 << order.axes_[i];
   }
-  require(name.size() == 3 && seen == 7,
-          fmt::format("rotation order: expected XYZ, XZY, YXZ, YZX, ZXY or ZYX, got '{}'", name));
+  require(
+      name.size() == 3 && seen == 7,
+      fmt::format("rotation order: expected XYZ, XZY, YXZ, YZX, ZXY or ZYX, got '{}'", printable(name, 60)));
   return order;
 }
 

@@ -17,6 +17,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/volume/detail/brick_distances.h"
+#include "nephele/render/volume/detail/largest_density.h"
 #include "nephele/render/volume/field_glow.h"
 #include "nephele/render/volume/trilinear.h"
 
@@ -64,8 +65,7 @@ void RenderVolume::measure(const CodedDensity* coded) {
     all = all.hull(range);
   }
   require(isFinite, "density: contains values that are not finite");
-  // Extinctions and optical depths are floats, too.
-  constexpr float most = 1e18f;
+  constexpr float most = detail::kLargestDensity;
   require(all.max <= most && all.min >= -most, fmt::format("density: expected values up to {:g}, got {:g}",
                                                            most, all.max > most ? all.max : all.min));
   checkColour(colour_.scattering, "colour");

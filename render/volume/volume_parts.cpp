@@ -31,6 +31,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/scene/black_body.h"
+#include "nephele/render/volume/detail/largest_density.h"
 #include "nephele/render/volume/detail/source_grid.h"
 
 namespace nephele {
@@ -343,7 +344,13 @@ bool isPlain(const std::vector<VolumePart>& parts) {
 void check(const VolumePart& part) {
   require(part.density || part.emission[0] || part.temperature,
           "volumes: one of them has neither density nor emission");
-  if (part.density) checkGrid(*part.density, "density", true);
+  if (part.density) {
+    checkGrid(*part.density, "density", true);
+    for (const Interval& range : part.density->ranges())
+      require(range.magnitude() * part.share <= detail::kLargestDensity,
+              fmt::format("density: expected values up to {:g}, got {:g}", detail::kLargestDensity,
+                          range.magnitude() * part.share));
+  }
   checkThree(part.colour, "colour", false);
   checkThree(part.emission, "emission", true);
   require(std::isfinite(part.share) && part.share >= 0,

@@ -121,6 +121,19 @@ TEST(RenderBadInput, IsRefusedByNameAndReason) {
   }
 }
 
+TEST(RenderBadInput, IsNamedBesideOtherVolumes) {
+  const TemporaryFolder good, bad;
+  const std::string other = writeBall(good, 0, [](openvdb::FloatGrid&) {}),
+                    path = writeBall(bad, 0, [](openvdb::FloatGrid&grid) {
+                      grid.getAccessor().setValue({0, 0, 0}, 1e30f);
+                    });
+  const ProgramResult result =
+      runProgram("render " + other + " " + path + " --size 8x6 -o " + good.file("a.exr"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find(path + ": density: expected values up to 1e+18"), std::string::npos)
+      << result.errors;
+}
+
 TEST(RenderBadInput, NothingFarAwayTakesNoMemory) {
   const TemporaryFolder folder;
   const std::string options = " --size 8x6 --samples 1 -o " + folder.file("a.exr");

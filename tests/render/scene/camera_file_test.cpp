@@ -248,6 +248,8 @@ TEST(CameraFile, SaysWhatIsWrongWithJsonAndWhere) {
       {frames("{\"frame\": 2, \"position\": [0,0,9], \"look_at\": [0,0,0], \"focus_distance\": -1}"),
        "a.json:3:", "focus_distance must be at least"},
       {"{\"rotation_order\": \"QQQ\", \"frames\": []}", "a.json:1:", "rotation order"},
+      {"{\"rotation_order\": \"\\n\", \"frames\": []}", "a.json:1:", "got '\\n'"},
+      {"{\"interpolation\": \"linear\\n\", \"frames\": []}", "a.json:1:", "not linear\\n"},
       {"{\"interpolation\": \"cubic\", \"frames\": []}", "a.json:1:", "smooth or linear"},
       {std::string(100, '['), "a.json:1:", "nested"}};
   for (const auto& c : cases) {
