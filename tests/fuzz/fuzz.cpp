@@ -12,7 +12,6 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
-#include <vector>
 
 #include "nephele/modeling/base/system.h"
 #include "tests/fuzz/fixed_inputs.h"
@@ -64,17 +63,33 @@ struct InputsUsed {
 } inputsUsed;
 
 /// Some inputs that could be read. libFuzzer's corpus fills with files that are broken in ever other ways,
-/// and changes of these seldom get behind the reader.
-std::vector<std::string> readable;
+/// and changes of these seldom get behind the reader. In memory that is there from the start: libFuzzer looks
+/// for leaks after each input that leaves something allocated.
+class ReadableInputs {
+ public:
+  void remember(std::string_view bytes) {
+    if (bytes.size() > kLongest) return;
+    Input& input = inputs_[seen_++ % kMost];
+    std::copy(bytes.begin(), bytes.end(), input.bytes);
+    input.size = bytes.size();
+  }
+  std::string_view any(std::size_t number) const {
+    const Input& input = inputs_[number % std::min(seen_, kMost)];
+    return {input.bytes, input.size};
+  }
+  bool isEmpty() const { return seen_ == 0; }
 
-void rememberReadable(std::string_view bytes, std::uint64_t number) {
-  constexpr std::size_t kMost = 64, kLongest = 1 << 16;
-  if (bytes.size() > kLongest) return;
-  if (readable.size() < kMost)
-    readable.emplace_back(bytes);
-  else
-    readable[number % kMost] = bytes;
-}
+ private:
+  static constexpr std::size_t kMost = 64, kLongest = 1 << 16;
+  struct Input {
+    char bytes[kLongest];
+    std::size_t size;
+  };
+  Input inputs_[kMost]{};
+  std::size_t seen_ = 0;
+};
+
+ReadableInputs readable;
 
 std::uint64_t hashOf(std::string_view bytes) {
   std::uint64_t hash = 14695981039346656037u;
@@ -146,7 +161,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace nephele::fuzz;
   ++inputsUsed.all;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  if (use(bytes)) rememberReadable(bytes, ++inputsUsed.read);
+  if (use(bytes)) {
+    ++inputsUsed.read;
+    readable.remember(bytes);
+  }
   return 0;
 }
 
@@ -158,8 +176,8 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   const auto change = [](Bytes bytes, std::size_t used) {
     return LLVMFuzzerMutate(bytes.data(), used, bytes.size());
   };
-  if (const std::uint32_t dice = seed >> 16; dice % 2 == 0 && !readable.empty()) {
-    const std::string& other = readable[dice / 2 % readable.size()];
+  if (const std::uint32_t dice = seed >> 16; dice % 2 == 0 && !readable.isEmpty()) {
+    const std::string_view other = readable.any(dice / 2);
     size = std::min(other.size(), most);
     std::copy_n(other.begin(), size, data);
   }
