@@ -17,7 +17,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/volume/detail/brick_distances.h"
-#include "nephele/render/volume/detail/largest_density.h"
+#include "nephele/render/volume/detail/holdable_density.h"
 #include "nephele/render/volume/field_glow.h"
 #include "nephele/render/volume/trilinear.h"
 
@@ -65,9 +65,7 @@ void RenderVolume::measure(const CodedDensity* coded) {
     all = all.hull(range);
   }
   require(isFinite, "density: contains values that are not finite");
-  constexpr float most = detail::kLargestDensity;
-  require(all.max <= most && all.min >= -most, fmt::format("density: expected values up to {:g}, got {:g}",
-                                                           most, all.max > most ? all.max : all.min));
+  detail::requireHoldableDensity(all);
   checkColour(colour_.scattering, "colour");
   checkColour(colour_.emission, "emission");
   findOccupied();

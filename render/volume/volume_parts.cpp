@@ -31,7 +31,7 @@
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/render/scene/black_body.h"
-#include "nephele/render/volume/detail/largest_density.h"
+#include "nephele/render/volume/detail/holdable_density.h"
 #include "nephele/render/volume/detail/source_grid.h"
 
 namespace nephele {
@@ -55,9 +55,10 @@ void checkGrid(const BrickGrid& grid, const char* name, bool needsZero) {
   require(
       !needsZero || grid.background() == 0.0f,
       fmt::format("{}: expected 0 outside of the volume, but its background is {}", name, grid.background()));
-  for (const Interval& range : grid.ranges())
-    require(std::isfinite(range.min) && std::isfinite(range.max),
-            fmt::format("{}: contains values that are not finite", name));
+  const bool isFinite = std::ranges::all_of(grid.ranges(), [](const Interval& range) {
+    return std::isfinite(range.min) && std::isfinite(range.max);
+  });
+  require(isFinite, fmt::format("{}: contains values that are not finite", name));
 }
 
 void checkThree(const VolumePart::Grids& grids, const char* name, bool needsZero) {
@@ -346,10 +347,9 @@ void check(const VolumePart& part) {
           "volumes: one of them has neither density nor emission");
   if (part.density) {
     checkGrid(*part.density, "density", true);
-    for (const Interval& range : part.density->ranges())
-      require(range.magnitude() * part.share <= detail::kLargestDensity,
-              fmt::format("density: expected values up to {:g}, got {:g}", detail::kLargestDensity,
-                          range.magnitude() * part.share));
+    Interval all = Interval::of(0);
+    for (const Interval& range : part.density->ranges()) all = all.hull(range);
+    detail::requireHoldableDensity({all.min * part.share, all.max * part.share});
   }
   checkThree(part.colour, "colour", false);
   checkThree(part.emission, "emission", true);
