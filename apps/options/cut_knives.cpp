@@ -52,6 +52,11 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
       {.count = a.randomPlanes, .box = box, .throughCentre = a.throughCentre, .seed = std::uint32_t(a.seed)});
   planes.insert(planes.end(), random.begin(), random.end());
   const auto amplitude = float(a.roughness.worldUnits(side));
+  if (double(amplitude) > side)
+    throw CLI::ValidationError(
+        "--roughness",
+        fmt::format("may be 0 to the longest side of what is cut, {:.4g} or 100%, and is {:.4g}", side,
+                    amplitude));
   for (std::uint32_t i = 0; i < planes.size(); ++i) {
     result.names.push_back((amplitude > 0 ? "rough plane " : "plane ") + planeText(planes[i]));
     if (amplitude == 0) {

@@ -205,6 +205,7 @@ TEST_F(CutVerb, BadOptionsAreUsageErrorsThatNameThem) {
                                 "--resolution 0",
                                 "--voxel-size 0",
                                 "--roughness -1",
+                                "--roughness 101%",
                                 "--roughness-octaves 0",
                                 "--roughness-frequency 0"}) {
     const ProgramResult result = attempt(model + " --random-planes 1 " + bad);
