@@ -100,20 +100,6 @@ CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& tar
   return option;
 }
 
-CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, const std::string& description) {
-  auto* option = app.add_option_function<std::string>(
-      name,
-      [&target, name](const std::string& text) {
-        const auto v = parseNumbers(name, text, "three numbers x,y,z");
-        if (v.size() != 3) refuseValue(name, text, "three numbers x,y,z");
-        target = {float(v[0]), float(v[1]), float(v[2])};
-      },
-      description);
-  option->type_name("X,Y,Z");
-  option->default_str(fmt::format("{:g},{:g},{:g}", target.x, target.y, target.z));
-  return option;
-}
-
 namespace {
 
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
@@ -164,7 +150,7 @@ CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<d
 }
 
 CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
-                        double low, double high, const std::function<void(const Vec3f&)>& set,
+                        double low, double high, const std::function<void(const Vec3d&)>& set,
                         const std::string& description) {
   constexpr double any = std::numeric_limits<double>::max();
   const std::string allowed = low > -any ? fmt::format("{}, each {} to {:g}", form, low, high) : form;
@@ -179,7 +165,7 @@ CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::strin
             bool fits = numbers.size() == count;
             for (const double number : numbers) fits = fits && number >= low && number <= high;
             if (!fits) refuseValue(name, text, wanted);
-            set({float(numbers[0]), float(numbers[1]), count > 2 ? float(numbers[2]) : 0.0f});
+            set({numbers[0], numbers[1], count > 2 ? numbers[2] : 0});
           },
           description)
       ->type_name(form);
@@ -301,9 +287,9 @@ void addPreviewFrame(CLI::App& app, CLI::Option* preview, int& width, int& heigh
   addSize(app, "--size", width, height, "Pixels across and down.")->needs(preview);
   addNumbers(
       app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360,
-      [&azimuthDegrees, &elevationDegrees](const Vec3f& v) {
-        azimuthDegrees = v.x;
-        elevationDegrees = v.y;
+      [&azimuthDegrees, &elevationDegrees](const Vec3d& v) {
+        azimuthDegrees = float(v.x);
+        elevationDegrees = float(v.y);
       },
       "Where the camera stands, in degrees: azimuth from the front (+z) towards +x, elevation from the "
       "horizon.")

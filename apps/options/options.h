@@ -46,8 +46,6 @@ CLI::Option* addLength(CLI::App& app, const std::string& name, std::optional<Len
                        const std::string& description, Sign sign = Sign::notNegative);
 CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& target,
                           const std::string& description);
-/// "x,y,z"
-CLI::Option* addVec3(CLI::App& app, const std::string& name, Vec3f& target, const std::string& description);
 /// A finite number in [low, high].
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
                        const std::string& description);
@@ -65,7 +63,7 @@ CLI::Option* addOptional(CLI::App& app, const std::string& name, std::optional<d
                          double high, const std::string& description);
 /// A list of `count` (2 or 3) numbers, each within [low, high], shown as `form` ("X,Y,Z").
 CLI::Option* addNumbers(CLI::App& app, const std::string& name, const std::string& form, std::size_t count,
-                        double low, double high, const std::function<void(const Vec3f&)>& set,
+                        double low, double high, const std::function<void(const Vec3d&)>& set,
                         const std::string& description);
 /// --shutter OPEN,CLOSE, two times of which the first is not the later; `unit` is what they count.
 void addShutter(CLI::App& app, const std::string& unit, const std::function<void(double, double)>& set,

@@ -32,18 +32,25 @@ void addTransformOptions(CLI::App& app, TransformOptions& options) {
   addChoice(app, "--unit", options.unit, units, "World unit of the input.");
   addChoice(app, "--to-unit", options.newUnit, units, "World unit of the output.");
   addNumber(app, "--scale", options.scale, 1e-9, 1e9, "Makes it so many times as large, about the origin.");
-  addVec3(app, "--rotate", options.degrees, "Turns it by degrees about x, then y, then z, about the origin.");
+  addNumbers(
+      app, "--rotate", "X,Y,Z", 3, -36000, 36000, [&options](const Vec3d& v) { options.degrees = v; },
+      "Turns it by degrees about x, then y, then z, about the origin.")
+      ->default_str("0,0,0");
   addChoice(app, "--place", options.place,
             {{"as-is", Place::asIs}, {"centre", Place::centre}, {"ground", Place::ground}},
             "Then moves its middle to the origin, or the middle of its bottom.");
-  addVec3(app, "--move", options.move, "Moves it at last, in units of the output.");
+  constexpr double kFarthest = 1e30;
+  addNumbers(
+      app, "--move", "X,Y,Z", 3, -kFarthest, kFarthest, [&options](const Vec3d& v) { options.move = v; },
+      "Moves it at last, in units of the output.")
+      ->default_str("0,0,0");
 }
 
 Similarity TransformOptions::turn() const {
   Similarity result;
   result.scale = kMetres[int(unit)] / kMetres[int(newUnit)] * scale;
   if (from != to) result = Similarity::rotation({from == UpAxis::z ? -90.0 : 90.0, 0, 0}) * result;
-  return Similarity::rotation(Vec3d(degrees)) * result;
+  return Similarity::rotation(degrees) * result;
 }
 
 Similarity TransformOptions::shift(const Box& box) const {
@@ -52,7 +59,7 @@ Similarity TransformOptions::shift(const Box& box) const {
     result.shift -= Vec3d(box.center());
     if (place == Place::ground) result.shift.y += double(box.center().y - box.min.y);
   }
-  result.shift += Vec3d(move);
+  result.shift += move;
   return result;
 }
 

@@ -18,7 +18,7 @@ struct TransformOptions {
   UpAxis from = UpAxis::y, to = UpAxis::y;
   Unit unit = Unit::metre, newUnit = Unit::metre;
   double scale = 1;
-  Vec3f degrees{}, move{};
+  Vec3d degrees{}, move{};
   Place place = Place::asIs;
 
   /// Units, up axis, scale and turn.

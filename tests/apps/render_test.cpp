@@ -320,40 +320,44 @@ TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
   std::ofstream(files.file("a.chan")) << "1 0 0 10 0 0 0 40\n5 2 0 10 0 0 0 40\n";
   std::ofstream(files.file("bad.chan")) << "1 0 0 10 0 0 0 40\n2 zero 0 10 0 0 0 40\n";
   std::ofstream(files.file("bad.json")) << "{\n\"frames\": 3}";
+  std::ofstream(files.file("away.json"))
+      << R"({"frames": [{"frame": 7, "position": [0, 0, 9], "rotation": [0, 180, 0], "f_stop": 2}]})";
   const std::string start = "render " + fog() + " -o " + folder.file("a.exr") + " --size 8x6 ";
   const std::string chan = "--camera " + files.file("a.chan") + " ";
   const struct {
     std::string arguments;
     int exitCode;
     std::string message;
-  } cases[] = {{"--crop 1,2,3", 2, "--crop"},
-               {"--crop 3,0,3,5", 2, "--crop"},
-               {"--crop 0,0,4.5,5", 2, "--crop"},
-               {"--crop 0,0,9,5", 2, "0,0,8,6"},
-               {"--projection fisheye", 2, "--projection"},
-               {"--orthographic-width 0", 2, "--orthographic-width"},
-               {"--focal-length 50 --fov 30", 2, "--fov"},
-               {"--focal-length 0", 2, "--focal-length"},
-               {"--film-width -3", 2, "--film-width"},
-               {"--f-stop 0", 2, "--f-stop"},
-               {"--f-stop 2 --lens-radius 1", 2, "--f-stop"},
-               {"--f-stop 2 --projection orthographic", 2, "--lens-radius"},
-               {"--lens-radius 1 --camera-position 0,0,9 --look-at 0,0,20", 2, "--focus-distance"},
-               {"--focus-distance 0", 2, "--focus-distance"},
-               {"--shutter 0.5", 2, "--shutter"},
-               {"--shutter 0.5,0", 2, "--shutter"},
-               {"--shutter 0,0.5", 2, "--shutter"},
-               {"--volume-motion 1,2", 2, "--volume-motion"},
-               {"--volume-motion 1,2,3", 2, "--shutter"},
-               {"--frame 3", 2, "--frame"},
-               {chan + "--frame 6", 2, "1 to 5"},
-               {chan + "--frame x", 2, "--frame"},
-               {chan + "--view 1,2", 2, "--view"},
-               {chan + "--rotation-order XYX", 2, "--rotation-order"},
-               {"--camera " + files.file("bad.chan"), 1, "bad.chan:2: 'zero' is not a number"},
-               {"--camera " + files.file("bad.json"), 1, "bad.json:2: "},
-               {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be opened for reading"},
-               {"--camera " + fog(), 1, ".chan, .json"}};
+  } cases[] = {
+      {"--crop 1,2,3", 2, "--crop"},
+      {"--crop 3,0,3,5", 2, "--crop"},
+      {"--crop 0,0,4.5,5", 2, "--crop"},
+      {"--crop 0,0,9,5", 2, "0,0,8,6"},
+      {"--projection fisheye", 2, "--projection"},
+      {"--orthographic-width 0", 2, "--orthographic-width"},
+      {"--focal-length 50 --fov 30", 2, "--fov"},
+      {"--focal-length 0", 2, "--focal-length"},
+      {"--film-width -3", 2, "--film-width"},
+      {"--f-stop 0", 2, "--f-stop"},
+      {"--f-stop 2 --lens-radius 1", 2, "--f-stop"},
+      {"--f-stop 2 --projection orthographic", 2, "--lens-radius"},
+      {"--lens-radius 1 --camera-position 0,0,9 --look-at 0,0,20", 2, "--focus-distance"},
+      {"--focus-distance 0", 2, "--focus-distance"},
+      {"--shutter 0.5", 2, "--shutter"},
+      {"--shutter 0.5,0", 2, "--shutter"},
+      {"--shutter 0,0.5", 2, "--shutter"},
+      {"--volume-motion 1,2", 2, "--volume-motion"},
+      {"--volume-motion 1,2,3", 2, "--shutter"},
+      {"--frame 3", 2, "--frame"},
+      {chan + "--frame 6", 2, "1 to 5"},
+      {chan + "--frame x", 2, "--frame"},
+      {chan + "--view 1,2", 2, "--view"},
+      {chan + "--rotation-order XYX", 2, "--rotation-order"},
+      {"--camera " + files.file("bad.chan"), 1, "bad.chan:2: 'zero' is not a number"},
+      {"--camera " + files.file("bad.json"), 1, "bad.json:2: "},
+      {"--camera " + files.file("away.json") + " --frame 7", 1, "away.json: frame 7: --focus-distance: "},
+      {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be opened for reading"},
+      {"--camera " + fog(), 1, ".chan, .json"}};
   for (const auto& c : cases) {
     const ProgramResult result = runProgram(start + c.arguments);
     EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;

@@ -41,6 +41,16 @@ TEST_F(TransformVerb, ChangesUpAxisUnitAndPlaceOfAMesh) {
   EXPECT_NEAR(boundingBox(readMesh(file("c.obj"))).size().z, 300, 1e-4f);
 }
 
+TEST_F(TransformVerb, MovesWhatLiesFarAwayWithoutRounding) {
+  // In float such places are half a metre apart.
+  std::ofstream(file("a.obj")) << "v 4500000.25 0 0\nv 4500001.25 0 0\nv 4500000.25 1 0.125\nf 1 2 3\n";
+  run(file("a.obj") + " -o " + file("b.obj") + " --move -4500000.25,0,-0.1");
+  const Mesh mesh = readMesh(file("b.obj"));
+  EXPECT_EQ(mesh.positions[0].x, 0);
+  EXPECT_EQ(mesh.positions[1].x, 1);
+  EXPECT_EQ(mesh.positions[2].z, 0.125 - 0.1);
+}
+
 TEST_F(TransformVerb, MovesLevelSetsAndDensitiesWithoutResampling) {
   const auto shape = bakeGrid(sphere({0.1f, 0, 0}, 0.5f),
                               {.voxelSize = 0.05f, .box = {{-1, -1, -1}, {1, 1, 1}}, .band = {-0.2f, 0.2f}});
@@ -67,6 +77,8 @@ TEST_F(TransformVerb, RefusesWhatDoesNotFit) {
     std::string message;
   } cases[] = {{file("a.obj") + " -o " + file("b.vdb"), 2, "a mesh becomes a mesh"},
                {file("a.obj") + " -o " + file("b.obj") + " --scale 0", 2, "--scale"},
+               {file("a.obj") + " -o " + file("b.obj") + " --rotate 0,0,1e308", 2, "--rotate"},
+               {file("a.obj") + " -o " + file("b.obj") + " --move 0,1e31,0", 2, "--move"},
                {file("a.obj") + " -o " + file("b.obj") + " --up-axis x", 2, "--up-axis"},
                {file("a.obj") + " -o " + file("b.obj") + " --unit parsec", 2, "--unit"},
                {file("none.obj") + " -o " + file("b.obj"), 1, "none.obj"}};

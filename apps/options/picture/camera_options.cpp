@@ -38,8 +38,8 @@ void addPlace(CLI::App& app, CameraOptions& options) {
   CLI::Option* view =
       addNumbers(
           app, "--view", "AZIMUTH,ELEVATION", 2, -360, 360,
-          [&options](const Vec3f& v) {
-            options.view = v;
+          [&options](const Vec3d& v) {
+            options.view = Vec3f(v);
             options.viewGiven = true;
           },
           "Where the camera stands, in degrees, at the distance that frames the volume: azimuth from the "
@@ -48,13 +48,17 @@ void addPlace(CLI::App& app, CameraOptions& options) {
   CLI::Option* position =
       addNumbers(
           app, "--camera-position", "X,Y,Z", 3, -kAny, kAny,
-          [&options](const Vec3f& v) { options.position = v; }, "Where the camera stands.")
+          [&options](const Vec3d& v) { options.position = Vec3f(v); }, "Where the camera stands.")
           ->excludes(view);
   addNumbers(
-      app, "--look-at", "X,Y,Z", 3, -kAny, kAny, [&options](const Vec3f& v) { options.lookAt = v; },
+      app, "--look-at", "X,Y,Z", 3, -kAny, kAny, [&options](const Vec3d& v) { options.lookAt = Vec3f(v); },
       "What it looks at; default: the middle of the volume.")
       ->needs(position);
-  addVec3(app, "--up", options.up, "What is up in the picture.")->needs(position);
+  addNumbers(
+      app, "--up", "X,Y,Z", 3, -kAny, kAny, [&options](const Vec3d& v) { options.up = Vec3f(v); },
+      "What is up in the picture.")
+      ->default_str("0,1,0")
+      ->needs(position);
   CLI::Option* file =
       app.add_option("--camera", options.file, "Animated camera: .chan (Nuke, Houdini) or .json.")
           ->type_name("FILE")
@@ -207,18 +211,22 @@ class Placement {
     double radius = chosen(options_.lensRadius, fromOptions ? std::nullopt : key.lensRadius).value_or(0);
     if (fStop) {
       if (camera.isOrthographic())
-        throw CLI::ValidationError("--f-stop",
-                                   "an orthographic camera has no focal length; give --lens-radius");
+        refuse(key, "--f-stop", "an orthographic camera has no focal length; give --lens-radius");
       radius = 1e-3 * focalLengthOf(double(frame.fovDegrees), options_.filmWidth) / (2 * *fStop);
     }
     if (radius == 0) return camera;
     const std::optional<double> focus = chosen(options_.focusDistance, key.focusDistance);
     const double distance = focus ? *focus : camera.project(Vec3d(middleOf(options_.seen))).z;
     if (!(distance > 0))
-      throw CLI::ValidationError("--focus-distance",
-                                 "the middle of the volume is not in front of the camera, so "
-                                 "that there must be one");
+      refuse(key, "--focus-distance",
+             "the middle of the volume is not in front of the camera, so that there must be one");
     return camera.withLens({radius, distance});
+  }
+
+  // A camera of a file is named with the frame that it is wrong at.
+  [[noreturn]] void refuse(const CameraKey& key, const char* option, const char* fault) const {
+    if (options_.file.empty()) throw CLI::ValidationError(option, fault);
+    throw Error(fmt::format("{}: frame {:g}: {}: {}", options_.file, key.frame, option, fault));
   }
 
   const CameraOptions& options_;

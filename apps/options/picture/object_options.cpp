@@ -53,7 +53,7 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
   addInputs(app, "--holdout-object", options.holdouts,
             "The same as a holdout: hides what is behind it, and is not seen itself.");
   addNumbers(
-      app, "--object-color", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.colour = v; },
+      app, "--object-color", "R,G,B", 3, 0, 1, [&options](const Vec3d& v) { options.colour = Vec3f(v); },
       "Share of the light that objects scatter.")
       ->default_str("0.5,0.5,0.5");
   addCount(app, "--checker", options.checkers, 0, 10000,
@@ -77,7 +77,8 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
       Sign::any)
       ->needs(ground);
   addNumbers(
-      app, "--ground-color", "R,G,B", 3, 0, 1, [&options](const Vec3f& v) { options.groundColour = v; },
+      app, "--ground-color", "R,G,B", 3, 0, 1,
+      [&options](const Vec3d& v) { options.groundColour = Vec3f(v); },
       "Share of the light that the plane scatters.")
       ->needs(ground)
       ->default_str("0.3,0.3,0.3");

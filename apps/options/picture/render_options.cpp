@@ -32,8 +32,8 @@ void addMedium(CLI::App& app, PictureOptions& options) {
       ->default_str("150 / longest side of the volume");
   addNumbers(
       app, "--albedo", "R,G,B", 3, 0, 1,
-      [&options](const Vec3f& v) {
-        options.medium.albedo = v;
+      [&options](const Vec3d& v) {
+        options.medium.albedo = Vec3f(v);
         options.albedoGiven = true;
       },
       "Share of the light met that is scattered.")
@@ -41,7 +41,7 @@ void addMedium(CLI::App& app, PictureOptions& options) {
                                 options.medium.albedo.z));
   addNumbers(
       app, "--extinction-color", "R,G,B", 3, 0, 1e6,
-      [&options](const Vec3f& v) { options.medium.extinctionColour = v; },
+      [&options](const Vec3d& v) { options.medium.extinctionColour = Vec3f(v); },
       "Multiplies the extinction, per colour.")
       ->default_str("1,1,1");
   app.add_option_function<std::string>(
@@ -131,8 +131,8 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
       ->default_str("Z");
   addViewOptions(app, options.view);
   addNumbers(
-      app, "--background", "R,G,B", 3, 0, kBrightest, [&options](const Vec3f& v) { options.background = v; },
-      "Linear colour behind the preview.")
+      app, "--background", "R,G,B", 3, 0, kBrightest,
+      [&options](const Vec3d& v) { options.background = Vec3f(v); }, "Linear colour behind the preview.")
       ->default_str("the sky's");
   addDisplayServer(app, options.displayServer);
 }

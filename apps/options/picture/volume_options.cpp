@@ -123,8 +123,9 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
 
 void checkCount(const std::string& option, std::size_t given, std::size_t volumes) {
   if (given > 1 && given != volumes)
-    throw Error(fmt::format("{}: got {} entries for {} volume{}, allowed: 1 or {}", option, given, volumes,
-                            volumes == 1 ? "" : "s", volumes));
+    throw Error(volumes == 1 ? fmt::format("{}: got {} entries for 1 volume, allowed: 1", option, given)
+                             : fmt::format("{}: got {} entries for {} volumes, allowed: 1 or {}", option,
+                                           given, volumes, volumes));
 }
 
 }  // namespace
