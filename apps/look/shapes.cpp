@@ -96,10 +96,8 @@ std::shared_ptr<const LookShapes::Carried> LookShapes::carried(const LookPlan& p
     result->object = subdividedAsAsked(readShape(transfer.to, run), transfer.subdivide, run);
     MeshWarpOptions options = transfer.warp;
     if (isQuick) options.quality = WarpQuality::fast;
-    options.voxelSize = double(boundingBox(result->reference).longestSide()) / transfer.resolution;
+    const MeshWarp warp = transfer.warped(result->reference, result->object, options, run);
     namingFile(fmt::format("{} to {}", transfer.from, transfer.to), [&] {
-      const MeshWarp warp =
-          warpMesh(triangulated(result->reference), triangulated(result->object), options, run);
       run.begin("measure");
       result->quality = transferQuality(result->reference, result->object, warp.images, run);
       if (hasUv(result->reference))

@@ -134,6 +134,17 @@ Mesh readShape(const std::string& path, const Run& run) {
   return mesh;
 }
 
+MeshWarp TransferArguments::warped(const Mesh& reference, const Mesh& object, MeshWarpOptions options,
+                                   const Run& run) const {
+  options.voxelSize = double(boundingBox(reference).longestSide()) / resolution;
+  const bool isRelaxed = options.method == WarpMethod::nacelle && options.quality != WarpQuality::fast;
+  run.requireMemory(estimateWarpBytes(object, options),
+                    isRelaxed ? "use --quality fast, take an object of fewer triangles"
+                              : "take an object of fewer triangles");
+  return namingFile(fmt::format("{} to {}", from, to),
+                    [&] { return warpMesh(triangulated(reference), triangulated(object), options, run); });
+}
+
 void TransferArguments::requirePictureMemory(const TextureBakeOptions& baked, const Run& run) const {
   if (!bakedTexture.empty())
     run.requireMemory(estimateBakeBytes(baked.width, baked.height),

@@ -38,6 +38,9 @@ struct TransferArguments {
   TransferOptions chosen(const Mesh& reference, const Mesh& object, const Run& run) const;
   /// `bake` with its size filled in.
   TextureBakeOptions bakeOptions(const Image& image) const;
+  /// `object` mapped to `reference`, with `options` at the resolution asked for.
+  /// @throws Error naming both files, or the option to change where it needs too much memory; Cancelled.
+  MeshWarp warped(const Mesh& reference, const Mesh& object, MeshWarpOptions options, const Run& run) const;
   /// Refuses pictures that need too much memory. @throws Error naming the option to change.
   void requirePictureMemory(const TextureBakeOptions& baked, const Run& run) const;
 };

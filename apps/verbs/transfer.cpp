@@ -19,18 +19,18 @@ namespace nephele::apps {
 namespace {
 
 /// The map in space, which grids of the distances make fast enough for millions of voxels.
-void writeWarp(const TransferArguments& arguments, const Mesh& reference, const Mesh& object,
-               MeshWarpOptions options, Run& run) {
+void writeWarp(const TransferArguments& arguments, const Mesh& reference, const Mesh& object, Run& run) {
   if (arguments.warpFile.empty() && arguments.warpedMesh.empty()) return;
   const Box box = boundingBox(object);
   const double voxelSize = run.longestSide(box) / arguments.resolution;
   run.requireMemory(WarpBricks::estimateBytes(box, voxelSize), "use a lower --resolution");
+  MeshWarpOptions options = arguments.warp;
   options.quality = WarpQuality::fast;
   // Grids would have to reach from one shape to the other; where that is far, distances stay exact.
   const Box target = boundingBox(reference);
   options.gridded =
       options.align != Alignment::none || target.including(box).longestSide() < 3 * target.longestSide();
-  const MeshWarp warp = warpMesh(triangulated(reference), triangulated(object), options, run);
+  const MeshWarp warp = arguments.warped(reference, object, options, run);
   run.begin("warp grid");
   // In units of the object again.
   const WarpBricks bricks(float(1 / warp.alignment.scale) * warp.object, box, {.voxelSize = voxelSize});
@@ -56,18 +56,14 @@ void transfer(const TransferArguments& arguments, Run& run) {
   const TextureBakeOptions bakeOptions = texture ? arguments.bakeOptions(*texture) : TextureBakeOptions{};
   arguments.requirePictureMemory(bakeOptions, run);
 
-  MeshWarpOptions warpOptions = arguments.warp;
-  warpOptions.voxelSize = double(boundingBox(reference).longestSide()) / arguments.resolution;
-  const std::string both = fmt::format("{} to {}", arguments.from, arguments.to);
-  const MeshWarp warp = namingFile(
-      both, [&] { return warpMesh(triangulated(reference), triangulated(object), warpOptions, run); });
-  const Mesh result = namingFile(both, [&] {
+  const MeshWarp warp = arguments.warped(reference, object, arguments.warp, run);
+  const Mesh result = namingFile(fmt::format("{} to {}", arguments.from, arguments.to), [&] {
     return options.names.empty() ? object : transferAttributes(reference, object, warp.images, options, run);
   });
   run.begin("measure");
   const TransferQuality quality = transferQuality(reference, object, warp.images, run);
 
-  writeWarp(arguments, reference, object, warpOptions, run);
+  writeWarp(arguments, reference, object, run);
   std::shared_ptr<const Image> baked;
   if (!arguments.bakedTexture.empty()) {
     const BakedTexture bake = bakeTexture(reference, *texture, object, warp.images, bakeOptions, run);

@@ -121,12 +121,15 @@ struct Pair {
 };
 
 /// The nearest points of the reference.
-Images snapped(const Pair& pair, const PointLanes& points) {
+Images snapped(const Pair& pair, const PointLanes& points, const Progress& progress) {
   Images images(points.x.size());
-  parallelFor(images.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    ExactDistance::Cursor cursor;
-    for (std::size_t i = begin; i < end; ++i) images[i] = pair.target->at(points[i], cursor).point;
-  });
+  parallelFor(
+      images.size(), kGrain,
+      [&](std::size_t begin, std::size_t end) {
+        ExactDistance::Cursor cursor;
+        for (std::size_t i = begin; i < end; ++i) images[i] = pair.target->at(points[i], cursor).point;
+      },
+      progress);
   return images;
 }
 
@@ -150,6 +153,7 @@ Images morphed(const Pair& pair, bool onGrids, const Progress& progress) {
   const auto [from, to] = distances(pair, onGrids, progress);
   PointLanes at(pair.laid.positions);
   for (int step = 1; step <= kSteps; ++step) {
+    progress.advance(double(step - 1) / kSteps);
     progress.check();
     const float share = float(step) / kSteps;
     PointLanes next(at.x.size());
@@ -157,7 +161,7 @@ Images morphed(const Pair& pair, bool onGrids, const Progress& progress) {
     nacelleAt(0.0f, between, at.points(), next.values(), {.steps = 5, .voxel = float(pair.voxel)});
     at = std::move(next);
   }
-  return snapped(pair, at);
+  return snapped(pair, at, SubProgress(progress, 1, 1));
 }
 
 struct Candidate {
@@ -167,8 +171,8 @@ struct Candidate {
   bool isRelaxed = false;
 };
 
-Candidate judged(const Pair& pair, Images images, bool isRelaxed) {
-  const TransferQuality quality = transferQuality(pair.reference.mesh, pair.object.mesh, images);
+Candidate judged(const Pair& pair, Images images, bool isRelaxed, const Progress& progress) {
+  const TransferQuality quality = transferQuality(pair.reference.mesh, pair.object.mesh, images, progress);
   const std::size_t tears = countTears(*pair.target, pair.laid, images);
   return {std::move(images), quality, tears, isRelaxed};
 }
@@ -187,13 +191,30 @@ double faultsOf(const Candidate& candidate) {
          kPerStretch * std::log(q.stretchP95);
 }
 
+/// The progress of attempts of which nobody knows how many there will be: each takes a share of what is left.
+class Attempts {
+ public:
+  explicit Attempts(const Progress& whole) : whole_(whole) {}
+  SubProgress next() {
+    constexpr double kShare = 0.15;
+    const double from = at_;
+    at_ += kShare * (1 - at_);
+    return {whole_, from, at_};
+  }
+
+ private:
+  const Progress& whole_;
+  double at_ = 0;
+};
+
 /// Relaxes `images` and keeps what is best: no worse in any number than closest points without alignment
 /// are, if there is such a map.
 Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, const Progress& progress) {
   // Equal shapes: there is nothing to gain, and exact correspondences to lose.
   constexpr double kFew = 1e-3, kHardlyStretched = 1.2, kGoodEnough = 3e-3;
+  Attempts attempts(progress);
   std::vector<Candidate> candidates;
-  candidates.push_back(judged(pair, images, false));
+  candidates.push_back(judged(pair, images, false, attempts.next()));
   const TransferQuality& plain = candidates.front().quality;
   if (plain.flippedFraction <= kFew && plain.degenerateFraction <= kFew &&
       plain.stretchP95 <= kHardlyStretched)
@@ -201,7 +222,8 @@ Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, 
   const Vec3d shift = pair.object.origin - pair.reference.origin;
   Images unaligned = pair.object.mesh.positions;
   for (Vec3d& p : unaligned) p += shift;
-  candidates.push_back(judged(pair, snapped(pair, PointLanes(unaligned)), false));
+  Images nearest = snapped(pair, PointLanes(unaligned), attempts.next());
+  candidates.push_back(judged(pair, std::move(nearest), false, attempts.next()));
   const TransferQuality closest = candidates.back().quality;
 
   // First what is no worse in anything, and of that what is whole; else fewer bad triangles of both kinds are
@@ -224,10 +246,11 @@ Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, 
     }
     return *best;
   };
-  SurfaceRelaxation relaxation(*pair.target, pair.laid);
+  SurfaceRelaxation relaxation(*pair.target, pair.laid, progress);
   // Attempts until one has hardly any fold.
   const auto attempt = [&](const Images& start, const RelaxationOptions& options) {
-    candidates.push_back(judged(pair, relaxation.relaxed(start, options, progress), true));
+    Images relaxed = relaxation.relaxed(start, options, attempts.next());
+    candidates.push_back(judged(pair, std::move(relaxed), true, attempts.next()));
     const TransferQuality& q = candidates.back().quality;
     return q.flippedFraction <= kGoodEnough && q.degenerateFraction <= kGoodEnough && isNoWorse(q, closest);
   };
@@ -243,9 +266,9 @@ Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, 
   const auto tornThenClosed = [&](const Images& start, int smoothingRounds) {
     RelaxationOptions torn{
         .smoothingRounds = smoothingRounds, .rounds = tearing, .limit = 5, .lastLimit = 3, .resistsFrom = 1};
-    Images at = relaxation.relaxed(start, torn, progress);
+    Images at = relaxation.relaxed(start, torn, attempts.next());
     torn.smoothingRounds = 0;
-    at = relaxation.relaxed(at, torn, progress);
+    at = relaxation.relaxed(at, torn, attempts.next());
     bool isGood = false;
     for (const double lastLimit : {3.0, 5.0, 5.0}) {
       isGood = attempt(
@@ -264,7 +287,7 @@ Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, 
     if (!bestOf(false).isRelaxed) tornThenClosed(images, 2);
   } else if (!isSameTopology || !attempt(images, {})) {
     const bool canMorph = pair.target->isSolid() && pair.source->isSolid();
-    const Images start = canMorph ? morphed(pair, isLarge, progress) : images;
+    const Images start = canMorph ? morphed(pair, isLarge, attempts.next()) : images;
     // Where there is time, from several starts.
     if (!tornThenClosed(start, 2) && !isLarge) {
       if (canMorph) tornThenClosed(images, 2);
@@ -280,8 +303,10 @@ Candidate improved(const Pair& pair, const Images& images, WarpQuality quality, 
       quality == WarpQuality::balanced && best.isRelaxed && best.tears > 0)
     attempt(Images(best.images),
             {.smoothingRounds = 0, .rounds = 16, .limit = 5, .lastLimit = 3, .resistsFrom = 0});
-  if (const Candidate& best = bestOf(false); best.isRelaxed)
-    candidates.push_back(judged(pair, relaxation.mended(best.images, progress), true));
+  if (const Candidate& best = bestOf(false); best.isRelaxed) {
+    Images mended = relaxation.mended(best.images, attempts.next());
+    candidates.push_back(judged(pair, std::move(mended), true, attempts.next()));
+  }
   return bestOf(true);
 }
 
@@ -333,6 +358,13 @@ LevelSets levelSets(const Pair& pair, double scale, const MeshWarpOptions& optio
 
 }  // namespace
 
+double estimateWarpBytes(const Mesh& object, const MeshWarpOptions& options) {
+  // Measured from 30 000 to 500 000 triangles; most of the second is the factorised system.
+  constexpr double kMapped = 1000, kRelaxed = 2600;
+  const bool isRelaxed = options.method == WarpMethod::nacelle && options.quality != WarpQuality::fast;
+  return (isRelaxed ? kRelaxed : kMapped) * (double(object.corners.size()) - 2 * double(object.faceCount()));
+}
+
 MeshWarp warpMesh(const Mesh& reference, const Mesh& object, const MeshWarpOptions& options,
                   const Progress& progress) {
   require(options.order >= 0 && options.order <= 2,
@@ -374,14 +406,14 @@ MeshWarp warpMesh(const Mesh& reference, const Mesh& object, const MeshWarpOptio
                                 .band = sets.band};
   const PointLanes points(pair.laid.positions);
   if (options.method == WarpMethod::closest) {
-    result.images = snapped(pair, points);
+    result.images = snapped(pair, points, progress);
   } else {
     PointLanes ends(points.x.size());
     const NacelleStatistics statistics =
         nacelleAt(0.0f, sets.reference, points.points(), ends.values(), nacelleOptions);
     result.iterations = statistics.iterations;
     result.unconvergedFraction = statistics.unconvergedFraction;
-    result.images = snapped(pair, ends);
+    result.images = snapped(pair, ends, progress);
     if (options.quality != WarpQuality::fast) {
       progress.begin("relax");
       Candidate best = improved(pair, result.images, options.quality, progress);

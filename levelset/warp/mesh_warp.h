@@ -73,4 +73,7 @@ struct MeshWarp {
 MeshWarp warpMesh(const Mesh& reference, const Mesh& object, const MeshWarpOptions& options = {},
                   const Progress& progress = silent());
 
+/// Bytes that `warpMesh` holds at most, beside the reference and grids.
+double estimateWarpBytes(const Mesh& object, const MeshWarpOptions& options);
+
 }  // namespace nephele

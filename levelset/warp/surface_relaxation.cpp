@@ -118,18 +118,19 @@ std::size_t countTears(const ExactDistance& reference, const Mesh& object, std::
 }
 
 struct SurfaceRelaxation::Parts {
-  Parts(const ExactDistance& to, const Mesh& from)
-      : reference(to), object(from), normals(to), all(to, normals, from) {}
+  Parts(const ExactDistance& to, const Mesh& from, const Progress& progress)
+      : reference(to), object(from), normals(to), all(to, normals, from, progress) {}
   const ExactDistance& reference;
   const Mesh& object;
   SmoothNormals normals;
   Relaxation all;
 };
 
-SurfaceRelaxation::SurfaceRelaxation(const ExactDistance& reference, const Mesh& object) {
+SurfaceRelaxation::SurfaceRelaxation(const ExactDistance& reference, const Mesh& object,
+                                     const Progress& progress) {
   requireValid(object);
   require(object.isTriangles(), "relaxation: the object must be triangulated");
-  parts_ = std::make_unique<Parts>(reference, object);
+  parts_ = std::make_unique<Parts>(reference, object, progress);
 }
 SurfaceRelaxation::~SurfaceRelaxation() = default;
 
@@ -163,9 +164,13 @@ std::vector<Vec3d> SurfaceRelaxation::mended(std::span<const Vec3d> images, cons
     int rings;
     double tearWeight, limit;
   };
-  for (const Try& attempt : {Try{4, 40, 5}, Try{4, 400, 5}, Try{10, 100, 5}, Try{10, 1000, 5},
-                             Try{20, 1000, 5}, Try{3, 40, 30}, Try{6, 40, 30}, Try{10, 40, 30}}) {
-    progress.check();
+  constexpr Try kTries[] = {{4, 40, 5},    {4, 400, 5}, {10, 100, 5}, {10, 1000, 5},
+                            {20, 1000, 5}, {3, 40, 30}, {6, 40, 30},  {10, 40, 30}};
+  double done = 0;
+  for (const Try& attempt : kTries) {
+    const SubProgress ofTry(progress, done, done + 1.0 / std::size(kTries));
+    done += 1.0 / std::size(kTries);
+    ofTry.check();
     const std::vector<std::uint8_t> before = tornTriangles(reference, object, result);
     std::vector<std::uint8_t> isBad = before;
     constexpr double kForTears = 5;
@@ -175,7 +180,7 @@ std::vector<Vec3d> SurfaceRelaxation::mended(std::span<const Vec3d> images, cons
     const Patches patches = patchesAround(object, isBad, attempt.rings);
     std::vector<Vec3d> trial = result;
     constexpr int kRounds = 12;
-    Relaxation local(reference, normals, object, patches.moves);
+    Relaxation local(reference, normals, object, patches.moves, ofTry);
     local.relax(trial,
                 {.smoothingRounds = 0,
                  .rounds = kRounds,
@@ -183,7 +188,7 @@ std::vector<Vec3d> SurfaceRelaxation::mended(std::span<const Vec3d> images, cons
                  .lastLimit = attempt.limit,
                  .resistsFrom = 0,
                  .tearWeight = attempt.tearWeight},
-                progress);
+                ofTry);
     // Part by part: torn triangles, and these with those that are turned over.
     std::vector<int> torn(result.size()), bad(result.size());
     const auto partOf = [&](std::size_t t) {

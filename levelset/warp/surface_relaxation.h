@@ -36,8 +36,9 @@ std::size_t countTears(const ExactDistance& reference, const Mesh& object, std::
 class SurfaceRelaxation {
  public:
   /// `object` is the object laid on the reference (its positions are where the alignment puts them; its size
-  /// does not matter). Both must outlive this. @throws Error if `object` has other faces than triangles.
-  SurfaceRelaxation(const ExactDistance& reference, const Mesh& object);
+  /// does not matter). Both must outlive this. @throws Error if `object` has other faces than triangles;
+  /// Cancelled.
+  SurfaceRelaxation(const ExactDistance& reference, const Mesh& object, const Progress& progress = silent());
   ~SurfaceRelaxation();
 
   /// Moves the images of the object's positions along the surface of the reference so that triangles keep

@@ -248,6 +248,7 @@ TransferQuality transferQuality(const Mesh& reference, const Mesh& object, std::
   for (const Vec3d& p : object.positions)
     require(isFinite(p), "transfer quality: the object has positions that are not finite");
 
+  progress.check();
   const detail::ReferenceSurface surface(reference);
   const std::vector<Triangle> triangles = mappedTriangles(object, images, surface.origin());
   TransferQuality quality;
@@ -277,7 +278,7 @@ TransferQuality transferQuality(const Mesh& reference, const Mesh& object, std::
           facts.isFlipped[i] = side * dot(normalOf(t), normal) < 0;
         }
       },
-      progress);
+      SubProgress(progress, 0, 0.5));
 
   const double count = double(triangles.size());
   quality.degenerateFraction =
@@ -286,10 +287,10 @@ TransferQuality transferQuality(const Mesh& reference, const Mesh& object, std::
   quality.stretchMedian = percentile(facts.stretch, 0.5);
   quality.stretchP95 = percentile(facts.stretch, 0.95);
   const std::vector<Sample> samples = evenSamples(surface);
-  const auto isCovered = coveredOf(surface, samples, triangles, facts, progress);
+  const auto isCovered = coveredOf(surface, samples, triangles, facts, SubProgress(progress, 0.5, 0.75));
   if (!samples.empty())
     quality.coverage = double(std::count(isCovered.begin(), isCovered.end(), 1)) / double(samples.size());
-  findRegions(surface, object, triangles, facts, progress, quality);
+  findRegions(surface, object, triangles, facts, SubProgress(progress, 0.75, 1), quality);
   return quality;
 }
 

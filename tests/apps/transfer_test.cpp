@@ -410,7 +410,8 @@ TEST_F(TransferVerb, RefusesFilesThatLackWhatIsAskedFor) {
       {"/nowhere/a.obj", sphere_, "/nowhere/a.obj"},
       {sphere_, "/nowhere/b.obj", "/nowhere/b.obj"},
       {sphere_ + " --warp " + file("w.vdb") + " --resolution 90000 --memory-limit 1G", sphere_,
-       "--resolution"}};
+       "--resolution"},
+      {sphere_ + " --subdivide 6 --memory-limit 500M", plain, "use --quality fast"}};
   const std::size_t before = folder_.entryCount();
   for (const auto& [from, to, said] : cases) {
     const ProgramResult result = transfer(from, to, "-o " + file("out.obj"));

@@ -80,7 +80,7 @@ Vec3d SmoothNormals::at(const ExactDistance::Hit& hit) const {
 }
 
 Relaxation::Relaxation(const ExactDistance& reference, const SmoothNormals& normals, const Mesh& object,
-                       const std::vector<std::uint8_t>& moves)
+                       const std::vector<std::uint8_t>& moves, const Progress& progress)
     : reference_(reference), normals_(normals) {
   const std::vector<std::uint32_t> first = firstEqualPosition(object.positions);
   double area = 0;
@@ -115,7 +115,7 @@ Relaxation::Relaxation(const ExactDistance& reference, const SmoothNormals& norm
     triangles_.push_back(triangle);
   }
   for (std::size_t v = 0; v < first.size(); ++v) indexOf_[v] = indexOf_[first[v]];
-  if (!triangles_.empty()) buildPattern();
+  if (!triangles_.empty()) buildPattern(progress);
 }
 
 void Relaxation::relax(std::span<Vec3d> images, const RelaxationOptions& options, const Progress& progress) {

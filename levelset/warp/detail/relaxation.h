@@ -66,11 +66,13 @@ struct RelaxationState {
 class Relaxation {
  public:
   /// All of the object.
-  Relaxation(const ExactDistance& reference, const SmoothNormals& normals, const Mesh& object)
-      : Relaxation(reference, normals, object, std::vector<std::uint8_t>(object.positions.size(), 1)) {}
+  Relaxation(const ExactDistance& reference, const SmoothNormals& normals, const Mesh& object,
+             const Progress& progress)
+      : Relaxation(reference, normals, object, std::vector<std::uint8_t>(object.positions.size(), 1),
+                   progress) {}
   /// The triangles that have a corner that `moves`; their other corners stay. Coincident positions agree.
   Relaxation(const ExactDistance& reference, const SmoothNormals& normals, const Mesh& object,
-             const std::vector<std::uint8_t>& moves);
+             const std::vector<std::uint8_t>& moves, const Progress& progress);
 
   /// `images` of all positions, the same count as the object's; those that move are replaced.
   void relax(std::span<Vec3d> images, const RelaxationOptions& options, const Progress& progress);
@@ -105,7 +107,7 @@ class Relaxation {
   // The linear system of a Newton step, in relaxation_system.cpp.
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  void buildPattern();
+  void buildPattern(const Progress& progress);
   /// Gradient and Hessian, the latter without its negative directions.
   void assemble(const RelaxationEnergy& energy);
   /// Gradient and lower half of the Hessian of one triangle by the six coordinates of its corners.

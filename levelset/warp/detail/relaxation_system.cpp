@@ -27,7 +27,7 @@ std::pair<int, int> entryOf(const RelaxedTriangle& t, int a, int b) {
 
 }  // namespace
 
-void Relaxation::buildPattern() {
+void Relaxation::buildPattern(const Progress& progress) {
   // Lower triangle of a matrix with 2 x 2 blocks for vertices and edges.
   std::vector<Eigen::Triplet<double>> entries;
   const auto n = 2 * isFixed_.size();
@@ -38,9 +38,11 @@ void Relaxation::buildPattern() {
         const auto [row, column] = entryOf(t, a, b);
         entries.emplace_back(row, column, 0.0);
       }
+  progress.check();
   matrix_.resize(int(n), int(n));
   matrix_.setFromTriplets(entries.begin(), entries.end());
   matrix_.makeCompressed();
+  progress.check();
   place_.reserve(21 * triangles_.size());
   for (const RelaxedTriangle& t : triangles_)
     for (int a = 0; a < 6; ++a)
@@ -56,6 +58,7 @@ void Relaxation::buildPattern() {
   settings.nmethods = 2;
   settings.method[0].ordering = CHOLMOD_METIS;
   settings.method[1].ordering = CHOLMOD_AMD;
+  progress.check();
   const OneThread oneThread;
   solver_.analyzePattern(matrix_);
 }

@@ -1,6 +1,7 @@
 #include "nephele/levelset/warp/mesh_warp.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -316,6 +317,44 @@ TEST(RelaxImages, RejectsBadOptions) {
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.limit = 0}), Error);
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.resistsFrom = -0.1}), Error);
   EXPECT_THROW(relaxImages(reference, mesh, mesh.positions, {.resistsFrom = 1.1}), Error);
+}
+
+TEST(MeshWarp, ProgressOfRelaxationRisesFromAttemptToAttempt) {
+  class Recorder final : public Progress {
+   public:
+    void begin(std::string_view stage) const override { isRelaxing_ = stage == "relax"; }
+    void advance(double fraction) const override {
+      if (isRelaxing_) fractions.push_back(fraction);
+    }
+    mutable std::vector<double> fractions;
+
+   private:
+    mutable bool isRelaxing_ = false;
+  };
+  const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  const Recorder progress;
+  // A ball on linked tori: no map without folds, so that there are several attempts.
+  warpMesh(figureObject(0.1f), test::icosphere(3, 1), {.quality = WarpQuality::best}, progress);
+  EXPECT_GE(progress.fractions.size(), 50u);
+  EXPECT_TRUE(std::is_sorted(progress.fractions.begin(), progress.fractions.end()));
+  EXPECT_GE(progress.fractions.back(), 0.5);
+  EXPECT_LE(progress.fractions.back(), 1);
+}
+
+TEST(MeshWarp, RelaxationIsCancelledBeforeItsFirstRound) {
+  class StopWhenRelaxing final : public Progress {
+   public:
+    void begin(std::string_view stage) const override { isRelaxing_ = stage == "relax"; }
+    void advance(double) const override { advances += isRelaxing_; }
+    bool cancelled() const override { return isRelaxing_; }
+    mutable int advances = 0;
+
+   private:
+    mutable bool isRelaxing_ = false;
+  };
+  const StopWhenRelaxing progress;
+  EXPECT_THROW(warpMesh(figureObject(0.1f), test::icosphere(3, 1), {}, progress), Cancelled);
+  EXPECT_EQ(progress.advances, 0);
 }
 
 }  // namespace
