@@ -135,8 +135,7 @@ TEST_F(VolumeOptionsOfRender, RefusesGridsOfTheWrongKind) {
 TEST_F(VolumeOptionsOfRender, RefusesListsThatDoNotFitTheVolumes) {
   const ProgramResult result = render(file("whole.vdb"), "--density-scale 1,2");
   EXPECT_NE(result.exitCode, 0);
-  EXPECT_NE(result.errors.find("--density-scale: got 2 entries for 1 volume, allowed: 1"),
-            std::string::npos)
+  EXPECT_NE(result.errors.find("--density-scale: got 2 entries for 1 volume, allowed: 1"), std::string::npos)
       << result.errors;
   EXPECT_EQ(render(file("whole.vdb"), "--density-scale -1").exitCode, 2);
   EXPECT_EQ(render(file("whole.vdb"), "--extinction-color 1,1").exitCode, 2);
