@@ -70,7 +70,7 @@ void requireWithin(const CameraKey& key, const char* name, const std::optional<d
   if (!value || (*value >= low && *value <= high)) return;
   throw Error(fmt::format(
       "frame {:g}: {} must be {}, got {:g}", key.frame, name,
-      high < 1e30 ? fmt::format("from {:g} to {:g}", low, high) : fmt::format("at least {:g}", low), *value));
+      high < 1e30 ? fmt::format("from {} to {}", low, high) : fmt::format("at least {:g}", low), *value));
 }
 
 // Camera to world of a camera at `position` that looks at `target`.
@@ -99,8 +99,12 @@ CameraMotion::CameraMotion(std::vector<CameraKey> keys, bool smooth)
                         i == 0 ? 0.0 : keys_[i - 1].frame));
     require(key.target.has_value() == keys_[0].target.has_value(),
             fmt::format("frame {:g}: look_at must be given at all frames or at none", key.frame));
+    constexpr double kLast = 1e9;
+    require(std::fabs(key.frame) <= kLast,
+            fmt::format("frame {:g}: frames are from {:g} to {:g}", key.frame, -kLast, kLast));
     requireWithin(key, "fov", key.fovDegrees, 0.01, 179);
-    requireWithin(key, "fov", key.verticalFovDegrees, 0.01, 179);
+    // What 0.01 to 179 across may be in a picture of any shape.
+    requireWithin(key, "fov", key.verticalFovDegrees, 1e-7, 179.99999);
     requireWithin(key, "orthographic_width", key.orthographicWidth, 1e-12, INFINITY);
     requireWithin(key, "f_stop", key.fStop, 1e-3, INFINITY);
     requireWithin(key, "lens_radius", key.lensRadius, 0, INFINITY);

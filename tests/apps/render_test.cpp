@@ -320,6 +320,7 @@ TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
   std::ofstream(files.file("a.chan")) << "1 0 0 10 0 0 0 40\n5 2 0 10 0 0 0 40\n";
   std::ofstream(files.file("bad.chan")) << "1 0 0 10 0 0 0 40\n2 zero 0 10 0 0 0 40\n";
   std::ofstream(files.file("bad.json")) << "{\n\"frames\": 3}";
+  std::ofstream(files.file("narrow.chan")) << "1 0 0 10 0 0 0 0.001\n";
   std::ofstream(files.file("away.json"))
       << R"({"frames": [{"frame": 7, "position": [0, 0, 9], "rotation": [0, 180, 0], "f_stop": 2}]})";
   const std::string start = "render " + fog() + " -o " + folder.file("a.exr") + " --size 8x6 ";
@@ -356,6 +357,8 @@ TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
       {"--camera " + files.file("bad.chan"), 1, "bad.chan:2: 'zero' is not a number"},
       {"--camera " + files.file("bad.json"), 1, "bad.json:2: "},
       {"--camera " + files.file("away.json") + " --frame 7", 1, "away.json: frame 7: --focus-distance: "},
+      {"--camera " + files.file("narrow.chan") + " --frame 1", 1,
+       "narrow.chan: frame 1: fov: must be from 0.01 to 179"},
       {"--camera " + files.file("none.chan"), 1, "none.chan: cannot be opened for reading"},
       {"--camera " + fog(), 1, ".chan, .json"}};
   for (const auto& c : cases) {

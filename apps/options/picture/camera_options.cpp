@@ -177,9 +177,12 @@ class Placement {
       frame.fovDegrees = float(fovDegreesOf(*options_.focalLength, options_.filmWidth));
     else if (key.fovDegrees)
       frame.fovDegrees = float(*key.fovDegrees);
-    else if (key.verticalFovDegrees)
+    else if (key.verticalFovDegrees) {
       frame.fovDegrees =
           float(fovDegreesOf(focalLengthOf(*key.verticalFovDegrees, frame.height), frame.width));
+      if (!(frame.fovDegrees >= 0.01f && frame.fovDegrees <= 179.0f))
+        refuse(key, "fov", "must be from 0.01 to 179 degrees across the picture");
+    }
     const std::optional<double> width = chosen(options_.orthographicWidth, key.orthographicWidth);
     if (width) frame.orthographicWidth = float(*width);
     return frame;

@@ -162,6 +162,12 @@ TEST(CameraFile, WritesChanThatItReadsBack) {
   const CameraMotion wide({{.frame = 1, .fovDegrees = 90}});
   const CameraMotion back = parseChan(chanText(wide, 2), "c.chan");
   EXPECT_NEAR(*back.keys()[0].verticalFovDegrees, 2 * std::atan(0.5) * 180 / M_PI, 1e-9);
+  // The narrowest and the widest, in wide and in high pictures.
+  for (const double across : {0.01, 179.0})
+    for (const double aspect : {1.5, 0.5, 65536.0, 1.0 / 65536})
+      EXPECT_NO_THROW(
+          parseChan(chanText(CameraMotion({{.frame = 1, .fovDegrees = across}}), aspect), "d.chan"))
+          << across << " " << aspect;
 }
 
 constexpr const char* kJson = R"({
@@ -211,7 +217,9 @@ TEST(CameraFile, SaysWhatIsWrongWithAChanAndWhere) {
       {"1 0 0 0 0 0 0\n2 0 0 1e999 0 0 0\n", "a.chan:2: '1e999' is not a number"},
       {"1 0 0 0 0 0 0\n2 0 0 0 0 0 0 30\n", "a.chan:2: has 8 numbers, the lines before have 7"},
       {"1 0 0 0 0 0 0\n\n1 0 0 0 0 0 0\n", "a.chan:3: frame 1 comes after frame 1, but frames must increase"},
-      {"1 0 0 0 0 0 0 30\n2 0 0 0 0 0 0 200\n", "a.chan:2: frame 2: fov must be from 0.01 to 179, got 200"}};
+      {"1 0 0 0 0 0 0 30\n2 0 0 0 0 0 0 200\n",
+       "a.chan:2: frame 2: fov must be from 1e-07 to 179.99999, got 200"},
+      {"-1e308 0 0 0 0 0 0 30\n", "a.chan:1: frame -1e+308: frames are from -1e+09 to 1e+09"}};
   for (const auto& c : cases) EXPECT_EQ(messageOf([&] { parseChan(c.text, "a.chan"); }), c.message);
 }
 
