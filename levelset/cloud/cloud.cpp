@@ -58,6 +58,14 @@ double square(double x) {
   return x * x;
 }
 
+/// By how much the space within `reach` around a convex body as large as `box` is more than its surface times
+/// `reach`: Steiner's formula.
+double volumeAroundCorners(const Box& box, double reach) {
+  const Vec3f size = box.size();
+  const double sides = double(size.x) + double(size.y) + double(size.z);
+  return M_PI * square(reach) * (sides + 4.0 / 3 * reach);
+}
+
 float thickestEdge(const CloudOptions& options) {
   const float thickest = options.edgeThickness.range(Box::everywhere()).max;
   require(std::isfinite(thickest), "makeCloud: edgeThickness has no finite range");
@@ -179,15 +187,17 @@ double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
   requireValid(mesh);
   // Measured, bytes: the program itself; the mesh and what finds its closest points, per face; the distance
   // to it, per voxel of its area; and both while they are made. The result stores leaves of 8 voxels on an
-  // edge that layers make larger.
+  // edge that layers make larger; around corners and edges of the shape, thick ones take more.
   constexpr double kProgram = 4.8e7, kFace = 160, kFaceWork = 330, kBase = 90, kBaseWork = 320, kLeaf = 8;
-  constexpr double kGrowth = 1.5, kCaution = 1.1;
+  constexpr double kGrowth = 1.5, kCaution = 1.1, kEdgeVoxel = 4;
   require(!options.layers.empty(), "estimatedCloudBytes: there must be at least one layer");
   const double area = surfaceArea(mesh), voxel = options.voxelSize;
   const double baseVoxels = area / square(double(baseVoxelSize(options.layers, options.voxelSize)));
   const double grids = options.withSurface ? 2 : 1;
   const double varying =
       std::abs(signedVolume(mesh)) * varyingShare(options.densityFactor, boundingBox(mesh));
+  const double edge = double(cloudEdgeReach(thickestEdge(options), options.voxelSize));
+  const double edges = kEdgeVoxel * volumeAroundCorners(boundingBox(mesh), edge) / (voxel * voxel * voxel);
   const CumuloBytes layers = estimatedCumuloBytes(options.layers, options.voxelSize, area, boundingBox(mesh));
   const double growth = std::min(1.45 + 0.17 * double(options.layers.size()), 2.2);
   const double stored = growth * (kLeaf + double(thickestEdge(options)) / voxel) * grids;
@@ -196,7 +206,7 @@ double estimatedCloudBytes(const Mesh& mesh, const CloudOptions& options) {
   const double faces = double(mesh.faceCount());
   const double making = kFaceWork * faces + kBaseWork * baseVoxels;
   const double base = kFace * faces + kBase * baseVoxels;
-  return kCaution * (kProgram + std::max({making, base + layers.peak, base + layers.kept + result}));
+  return kCaution * (kProgram + edges + std::max({making, base + layers.peak, base + layers.kept + result}));
 }
 
 }  // namespace nephele

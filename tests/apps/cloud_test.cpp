@@ -275,10 +275,12 @@ TEST(CloudVerb, RefusesFogAsInput) {
 
 TEST(CloudVerb, RefusesWorkThatDoesNotFitAndNamesTheOption) {
   const TemporaryFolder folder;
-  const ProgramResult result =
-      runProgram("cloud " + kSphere + " -o " + folder.file("out.vdb") + " --resolution 100000");
-  EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find("--resolution"), std::string::npos) << result.errors;
+  for (const std::string options : {"--resolution 100000", "--resolution 24 --edge-thickness 500"}) {
+    const ProgramResult result =
+        runProgram("cloud " + kSphere + " -o " + folder.file("out.vdb") + " " + options);
+    EXPECT_EQ(result.exitCode, 1) << options;
+    EXPECT_NE(result.errors.find("--resolution"), std::string::npos) << result.errors;
+  }
   EXPECT_EQ(folder.entryCount(), 0u);
 }
 

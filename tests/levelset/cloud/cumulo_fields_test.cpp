@@ -20,6 +20,7 @@
 #include "nephele/modeling/shape/shapes.h"
 #include "tests/support/check_field.h"
 #include "tests/support/test_data.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele {
 namespace {
@@ -244,6 +245,22 @@ TEST(CumuloFields, MemoryIsEstimatedNearWhatWasMeasured) {
     const double estimate = estimatedCloudBytes(mesh, options) / 1e6;
     EXPECT_GE(estimate, 0.9 * m.megabytes) << m.resolution << " " << m.layers;
     EXPECT_LE(estimate, 1.5 * m.megabytes) << m.resolution << " " << m.layers;
+  }
+}
+
+TEST(CumuloFields, ThickEdgesAreInTheEstimateOfMemory) {
+  const Mesh ball = test::icosphere(1, 4);
+  constexpr double kVoxel = 0.1;
+  for (const double edge : {20.0, 80.0, 320.0}) {
+    const double estimate =
+        estimatedCloudBytes(ball, {.layers = cumuloLayers({.layers = 1, .amplitude = 0.05f, .frequency = 2}),
+                                   .voxelSize = float(kVoxel),
+                                   .edgeThickness = float(edge)});
+    // A float for each voxel of the ball that is half of the edge larger; the layers reach up to twice as
+    // far.
+    const double least = 4 * 4.0 / 3 * M_PI * std::pow((1 + edge / 2) / kVoxel, 3);
+    EXPECT_GE(estimate, least) << edge;
+    EXPECT_LE(estimate, 12 * least) << edge;
   }
 }
 
