@@ -105,6 +105,10 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     double whole = 0;
     for (const CutPart& part : parts) whole += signedVolume(part.mesh);
     result.options.minVolume = a.minVolume->worldUnits(whole);
+    if (*result.options.minVolume > whole)
+      throw CLI::ValidationError(
+          "--min-volume", fmt::format("may be 0 to the volume of what is cut, {:.4g} or 100%, and is {:.4g}",
+                                      whole, *result.options.minVolume));
   }
   return result;
 }

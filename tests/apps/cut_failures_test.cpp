@@ -200,6 +200,7 @@ TEST_F(CutVerb, BadOptionsAreUsageErrorsThatNameThem) {
                                 "--geometry about",
                                 "--min-volume -1",
                                 "--min-volume x",
+                                "--min-volume 1e6",
                                 "--format stl",
                                 "--preview p.jpg",
                                 "--resolution 0",

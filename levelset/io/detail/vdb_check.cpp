@@ -13,11 +13,13 @@
 #include <istream>
 #include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/levelset/io/detail/blosc_header.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::detail {
 
@@ -267,6 +269,23 @@ void checkDescriptor(FileBytes& bytes) {
   bytes.skip(3 * std::int64_t(sizeof(std::int64_t)));
 }
 
+namespace {
+
+/// Under the names that OpenVDB sets itself it takes no value of another type.
+void checkTypes(const openvdb::MetaMap& metadata) {
+  using Grid = openvdb::GridBase;
+  const std::pair<const char*, std::string> own[] = {
+      {Grid::META_GRID_CLASS, "string"},   {Grid::META_GRID_CREATOR, "string"},
+      {Grid::META_GRID_NAME, "string"},    {Grid::META_VECTOR_TYPE, "string"},
+      {Grid::META_IS_LOCAL_SPACE, "bool"}, {Grid::META_SAVE_HALF_FLOAT, "bool"}};
+  for (const auto& [name, type] : own)
+    if (const auto value = metadata[name]; value && value->typeName() != type)
+      throw Error(fmt::format("its metadata '{}' is of type '{}' and must be of type {}", name,
+                              printable(value->typeName(), 40), type));
+}
+
+}  // namespace
+
 bool isCheckable(const openvdb::GridBase& grid) {
   return layoutOf(grid) != nullptr;
 }
@@ -281,6 +300,7 @@ std::vector<std::int64_t> checkGrid(FileBytes& bytes, const openvdb::GridBase& g
   openvdb::io::setCurrentVersion(stream);
   openvdb::MetaMap metadata;
   metadata.readMeta(stream);
+  checkTypes(metadata);
   const auto asHalf = metadata[openvdb::GridBase::META_SAVE_HALF_FLOAT];
   checkTransform(bytes);
   try {

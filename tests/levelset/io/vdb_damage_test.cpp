@@ -128,6 +128,13 @@ TEST_F(VdbDamage, MetadataOfTheWrongSizeIsRefused) {
       std::string::npos);
 }
 
+TEST_F(VdbDamage, MetadataOfOpenVdbsOwnOfAnotherTypeIsRefused) {
+  const std::size_t type = whole_.find("is_saved_as_half_float") + std::strlen("is_saved_as_half_float") + 4;
+  ASSERT_EQ(whole_.substr(type, 4), "bool");
+  EXPECT_NE(errorOf(with(whole_, type, '@')).find("metadata 'is_saved_as_half_float' is of type '@ool'"),
+            std::string::npos);
+}
+
 TEST_F(VdbDamage, BlocksThatAreNotAsLongAsTheirNodeAreRefused) {
   const std::size_t block = firstBlock();
   const auto length = at<std::int64_t>(block);
