@@ -185,30 +185,13 @@ TEST_F(CutVerb, RefusesBadFiles) {
 
 TEST_F(CutVerb, BadOptionsAreUsageErrorsThatNameThem) {
   const std::string model = box();
-  for (const std::string bad : {"--plane 1,2,3",
-                                "--plane 0,0,0,0,0,0",
-                                "--plane 0,0,0,0,nan,1",
-                                "--random-planes 0",
-                                "--random-planes -3",
-                                "--voronoi 0",
-                                "--voronoi -4",
-                                "--voronoi many",
-                                "--kerf -1",
-                                "--kerf 1,2",
-                                "--explode -1",
-                                "--seed -1",
-                                "--geometry about",
-                                "--min-volume -1",
-                                "--min-volume x",
-                                "--min-volume 1e6",
-                                "--format stl",
-                                "--preview p.jpg",
-                                "--resolution 0",
-                                "--voxel-size 0",
-                                "--roughness -1",
-                                "--roughness 101%",
-                                "--roughness-octaves 0",
-                                "--roughness-frequency 0"}) {
+  for (const std::string bad :
+       {"--plane 1,2,3",      "--plane 0,0,0,0,0,0", "--plane 0,0,0,0,nan,1", "--random-planes 0",
+        "--random-planes -3", "--voronoi 0",         "--voronoi -4",          "--voronoi many",
+        "--kerf -1",          "--kerf 1,2",          "--explode -1",          "--seed -1",
+        "--geometry about",   "--min-volume -1",     "--min-volume x",        "--min-volume 1e6",
+        "--format stl",       "--preview p.jpg",     "--resolution 0",        "--voxel-size 0",
+        "--roughness -1",     "--roughness 101%",    "--roughness-octaves 0", "--roughness-frequency 0"}) {
     const ProgramResult result = attempt(model + " --random-planes 1 " + bad);
     EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;
     EXPECT_NE(result.errors.find(bad.substr(0, bad.find(' '))), std::string::npos) << result.errors;
