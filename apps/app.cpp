@@ -258,9 +258,18 @@ void work(Command& command, Line& line, const std::vector<Verb>& verbs, ProgramR
   }
 }
 
+/// Programs may give texts that no shell can, at which messages and names of files would end.
+void refuseBytesOfZero(const std::vector<std::string>& arguments) {
+  for (const std::string& argument : arguments)
+    if (argument.find('\0') != std::string::npos)
+      throw CLI::ValidationError(
+          fmt::format("{} has a byte of zero in it, which no argument may", nephele::quoted(argument)));
+}
+
 /// What `arguments` stand for; `command` has read those of its first call.
 Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<std::string> arguments,
                 const std::function<void(const std::string&)>& note) {
+  refuseBytesOfZero(arguments);
   const std::string& name = command.verb.name;
   const std::vector<std::string> names = namesOf(verbs);
   const auto withSettings = [&](std::vector<std::string> typed) {

@@ -99,6 +99,15 @@ void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
     refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
 }
 
+void refuseEmptyNames(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    if (type.find("FILE") == std::string::npos && type.find("FOLDER") == std::string::npos) continue;
+    for (const std::string& value : option->results())
+      if (value.empty()) refuseValue(option->get_name(false, true), value, "the name of a file");
+  }
+}
+
 }  // namespace
 
 Command::Command(const Verb& of) : verb(of), app(of.summary, "nephele " + of.name) {
@@ -118,6 +127,7 @@ void Command::parse(std::vector<std::string> arguments) {
   for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
   std::reverse(arguments.begin(), arguments.end());
   app.parse(std::move(arguments));
+  refuseEmptyNames(app);
   if (verb.passesOthersOn) return;
   for (const std::string& extra : app.remaining()) {
     if (!extra.starts_with('-'))

@@ -62,15 +62,8 @@ struct FiniteValues {
 
   template <class Node>
   bool operator()(const Node& node, std::size_t) {
-    for (auto value = node.cbeginValueOn(); value; ++value) {
-      const auto v = double(*value);
-      if (std::isfinite(v)) {
-        min = std::min(min, v);
-        max = std::max(max, v);
-      } else {
-        notFinite += voxelsOf(node);
-      }
-    }
+    for (auto value = node.cbeginValueOn(); value; ++value)
+      if (!add(*value)) notFinite += voxelsOf(node);
     return true;
   }
   void join(const FiniteValues& other) {
@@ -80,6 +73,19 @@ struct FiniteValues {
   }
 
  private:
+  /// Returns whether it is finite.
+  bool add(double value) {
+    if (!std::isfinite(value)) return false;
+    min = std::min(min, value);
+    max = std::max(max, value);
+    return true;
+  }
+  template <class T>
+  bool add(const openvdb::math::Vec3<T>& value) {
+    const bool x = add(double(value.x())), y = add(double(value.y())), z = add(double(value.z()));
+    return x && y && z;
+  }
+
   /// Of one of its values.
   template <class Node>
   static std::uint64_t voxelsOf(const Node&) {
@@ -236,12 +242,10 @@ VdbGridInfo describe(const VdbGrid& handle) {
 }
 
 VdbValueRange valueRange(const VdbGrid& handle) {
-  const openvdb::GridBase& grid = *handle.impl().grid;
+  using namespace openvdb;
   FiniteValues values;
-  if (grid.isType<openvdb::FloatGrid>())
-    values = finiteValues(static_cast<const openvdb::FloatGrid&>(grid).tree());
-  if (grid.isType<openvdb::DoubleGrid>())
-    values = finiteValues(static_cast<const openvdb::DoubleGrid&>(grid).tree());
+  handle.impl().grid->apply<TypeList<FloatGrid, DoubleGrid, Vec3SGrid, Vec3DGrid>>(
+      [&](const auto& grid) { values = finiteValues(grid.tree()); });
   if (!(values.min <= values.max)) return {0.0f, 0.0f, values.notFinite};
   return {float(values.min), float(values.max), values.notFinite};
 }

@@ -154,6 +154,25 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
   failReading(path, fmt::format("no grid '{}'; {}", name, listOf(wrapped(grids))));
 }
 
+/// Values that 16 bit floats do not hold would become infinite, and a level set of tiny voxels all zeros.
+void requireHalfHolds(const VdbGrid& grid) {
+  constexpr float kMost = 65504, kApart = 6e-8f, kLeastVoxel = 500 * kApart;
+  const VdbGridInfo info = describe(grid);
+  if (!info.halfFloat) return;
+  const VdbValueRange range = valueRange(grid);
+  const float most = std::max(-range.min, range.max);
+  if (most > kMost)
+    throw Error(
+        fmt::format("the grid '{}' has values up to {:.6g}, and 16 bit floats end at {:g}; write 32 bit "
+                    "floats, without --half",
+                    printable(info.name), most, kMost));
+  if (info.gridClass == VdbGridInfo::Class::levelSet && info.voxelSize.x < kLeastVoxel)
+    throw Error(
+        fmt::format("the grid '{}' has voxels of {:.3g}, too small for 16 bit floats, which are {:g} apart; "
+                    "write 32 bit floats, without --half",
+                    printable(info.name), info.voxelSize.x, kApart));
+}
+
 void requireWritable(const std::vector<VdbGrid>& grids) {
   require(!grids.empty(), "no grid to write");
   std::set<std::string> names;
@@ -164,6 +183,7 @@ void requireWritable(const std::vector<VdbGrid>& grids) {
                                                    printable(grid.getName()), grid.valueType()));
     require(names.insert(grid.getName()).second,
             fmt::format("two grids are called '{}'", printable(grid.getName())));
+    requireHalfHolds(each);
   }
 }
 

@@ -47,13 +47,13 @@ struct VdbGridInfo {
 
 VdbGridInfo describe(const VdbGrid& grid);
 
-/// What the active values of a scalar grid reach.
+/// What the active values of a grid reach, or their components.
 struct VdbValueRange {
   float min = 0.0f, max = 0.0f;  ///< Over finite ones; 0 where there are none.
   std::uint64_t notFinite = 0;   ///< Voxels that are infinite or not a number.
 };
 
-/// Cost: a look at all values. Nothing of a grid that is not scalar.
+/// Cost: a look at all values. Nothing of a grid that holds no floats, doubles or vectors of these.
 VdbValueRange valueRange(const VdbGrid& grid);
 
 /// Whether a path is that of a volume, by its name: .vdb or .nvdb, in small or capital letters.
@@ -130,7 +130,8 @@ VdbGrid toVdb(const VectorGrids& grids, const VdbGridLabel& label);
 VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
 /// Of grids that were read and are to be written again. @throws Error naming a grid of points, whose values
-/// are not read, or two grids of one name.
+/// are not read, two grids of one name, or a grid that is to be written in 16 bits and has values beyond
+/// 65504 or, as a level set, voxels below 3e-5.
 void requireWritable(const std::vector<VdbGrid>& grids);
 
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)

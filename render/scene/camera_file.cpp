@@ -284,7 +284,7 @@ std::string chanText(const CameraMotion& motion, double aspect, const RotationOr
     // A key without an angle has that of the curve through those that have one.
     const CameraKey key = motion.at(given.frame);
     const Vec3d degrees = key.rotation.eulerDegrees(order);
-    text += fmt::format("{:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g}", key.frame, key.position.x,
+    text += fmt::format("{} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g}", key.frame, key.position.x,
                         key.position.y, key.position.z, degrees.x, degrees.y, degrees.z);
     if (key.verticalFovDegrees) text += fmt::format(" {:.12g}", *key.verticalFovDegrees);
     if (key.fovDegrees)
@@ -302,7 +302,7 @@ std::string cameraJsonText(const CameraMotion& motion) {
   std::string frames;
   for (const CameraKey& key : motion.keys()) {
     frames += frames.empty() ? "\n" : ",\n";
-    frames += fmt::format("    {{\"frame\": {:.12g}, \"position\": {}", key.frame, triple(key.position));
+    frames += fmt::format("    {{\"frame\": {}, \"position\": {}", key.frame, triple(key.position));
     if (key.target)
       frames += fmt::format(", \"look_at\": {}, \"up\": {}", triple(*key.target), triple(key.up));
     else

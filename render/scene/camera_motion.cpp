@@ -57,20 +57,21 @@ struct Curve {
   }
 };
 
-template <class T>
-bool allFinite(const T& value) {
-  if constexpr (std::is_same_v<T, Vec3d>)
-    return isFinite(value);
-  else
-    return std::isfinite(value);
-}
-
 void requireWithin(const CameraKey& key, const char* name, const std::optional<double>& value, double low,
                    double high) {
   if (!value || (*value >= low && *value <= high)) return;
   throw Error(fmt::format(
       "frame {:g}: {} must be {}, got {:g}", key.frame, name,
       high < 1e30 ? fmt::format("from {} to {}", low, high) : fmt::format("at least {:g}", low), *value));
+}
+
+/// Differences and squares of such are still numbers.
+void requireNotFar(const CameraKey& key, const char* name, const Vec3d& value) {
+  constexpr double kMost = 1e30;
+  for (const double coordinate : {value.x, value.y, value.z})
+    if (!(std::fabs(coordinate) <= kMost))
+      throw Error(fmt::format("frame {:g}: {} must be from {:g} to {:g} along each axis, got {:g}", key.frame,
+                              name, -kMost, kMost, coordinate));
 }
 
 // Camera to world of a camera at `position` that looks at `target`.
@@ -91,12 +92,14 @@ CameraMotion::CameraMotion(std::vector<CameraKey> keys, bool smooth)
   require(!keys_.empty(), "holds no frames");
   for (std::size_t i = 0; i != keys_.size(); ++i) {
     CameraKey& key = keys_[i];
-    require(std::isfinite(key.frame) && allFinite(key.position) && allFinite(key.up) &&
-                (!key.target || allFinite(*key.target)),
-            fmt::format("frame {:g}: has a number that is not finite", key.frame));
-    require(i == 0 || key.frame > keys_[i - 1].frame,
-            fmt::format("frame {:g}: comes after frame {:g}, but frames must increase", key.frame,
-                        i == 0 ? 0.0 : keys_[i - 1].frame));
+    require(std::isfinite(key.frame), "a frame has a number that is not finite");
+    requireNotFar(key, "position", key.position);
+    requireNotFar(key, "up", key.up);
+    if (key.target) requireNotFar(key, "look_at", *key.target);
+    constexpr double kLeastStep = 1e-6;
+    require(i == 0 || key.frame - keys_[i - 1].frame >= kLeastStep,
+            fmt::format("frame {:g}: comes after frame {:g}, but frames must increase, by {:g} at least",
+                        key.frame, i == 0 ? 0.0 : keys_[i - 1].frame, kLeastStep));
     require(key.target.has_value() == keys_[0].target.has_value(),
             fmt::format("frame {:g}: look_at must be given at all frames or at none", key.frame));
     constexpr double kLast = 1e9;

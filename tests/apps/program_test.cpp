@@ -308,6 +308,25 @@ TEST(Program, AnyOutputIsTriedBeforeTheWork) {
   EXPECT_EQ(folder.entryCount(), 0u) << "nothing was made before the fault was found";
 }
 
+TEST(Program, NamesOfFilesAreNotEmpty) {
+  const TemporaryFolder folder;
+  const std::string out = " -o " + folder.file("a.vdb");
+  for (const auto& [arguments, option] :
+       {std::pair{"levelset " + kMesh + out + " --stats ''", "--stats"},
+        {"levelset ''" + out, "input"},
+        {"levelset " + kMesh + out + " --contact-sheet ''", "--contact-sheet"},
+        {"cut " + kMesh + " -o " + folder.file("a") + " --knife ''", "--knife"},
+        {"cloud " + kMesh + out + " --cache ''", "--cache"},
+        {"render x.vdb -o " + folder.file("a.exr") + " --holdout ''", "--holdout"}}) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.exitCode, 2) << arguments << "\n" << result.errors;
+    EXPECT_NE(result.errors.find(std::string(option) + ": got '', allowed: the name of a file"),
+              std::string::npos)
+        << result.errors;
+  }
+  EXPECT_EQ(folder.entryCount(), 0u);
+}
+
 TEST(Program, WorkBeyondTheMemoryIsRefusedWhateverAsksForIt) {
   const TemporaryFolder folder;
   const std::string out = folder.file("out"), limit = " --memory-limit 2G";

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -63,6 +64,17 @@ TEST_F(WispsVerb, MakesWispsWithoutAnInput) {
   const double expected = 6 * 2 * 4.0 / 3 * M_PI * std::pow(0.5, 3);
   EXPECT_NEAR(double(stats["mass"]) / expected, 1, 1e-5);
   EXPECT_NEAR(mass(file("w.vdb")) / expected, 1, 1e-3);
+}
+
+// A wisp of so large a mean density holds voxels beyond 65504, where half floats end.
+TEST_F(WispsVerb, RefusesHalfFloatsThatWouldBeInfinite) {
+  const std::string dense = kSmall + "--guides 1 --density 1e6 ";
+  EXPECT_EQ(wisps("w.vdb", dense).exitCode, 0);
+  const ProgramResult result = wisps("h.vdb", dense + "--half");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("h.vdb: the grid 'density' has values up to"), std::string::npos)
+      << result.errors;
+  EXPECT_FALSE(std::filesystem::exists(file("h.vdb")));
 }
 
 TEST_F(WispsVerb, TakesPointsWithWhatTheyCarry) {

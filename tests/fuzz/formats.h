@@ -47,6 +47,8 @@ bool useCamera(const Input& input);
 bool useViewConfig(const Input& input);
 bool useToml(const Input& input);
 bool useFieldTexts(const Input& input);
+/// A verb and its arguments, one a line. Whether it did its work.
+bool useVerb(const Input& input);
 bool useScript(const Input& input);
 /// The bytes are no file but say which calls write some, in which order. What can be read is what these have
 /// written.

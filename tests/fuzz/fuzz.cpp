@@ -19,6 +19,7 @@
 #include "tests/fuzz/harness.h"
 #include "tests/fuzz/json_changes.h"
 #include "tests/fuzz/mutators.h"
+#include "tests/fuzz/verb_calls.h"
 
 namespace nephele::fuzz {
 namespace {
@@ -42,6 +43,7 @@ constexpr Format kFormats[] = {
     {"toml", ".toml", useToml},
     {"field", ".txt", useFieldTexts},
     {"felt", ".felt", useScript},
+    {"verbs", ".txt", useVerb, mutateArguments},
     {"calls", ".bin", useCalls},
 };
 

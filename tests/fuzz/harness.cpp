@@ -93,9 +93,7 @@ std::string& lastError() {
 
 bool runVerb(std::vector<std::string> arguments, std::string_view named) {
   using namespace nephele::apps;
-  static const std::vector<Verb> verbs = {levelsetVerb(), cloudVerb(), advectVerb(),   wispsVerb(),
-                                          meshVerb(),     cutVerb(),   transferVerb(), transformVerb(),
-                                          renderVerb(),   infoVerb(),  feltVerb()};
+  static const std::vector<Verb> verbs = allVerbs();
   arguments.insert(arguments.end(), {"--quiet", "--threads", "1", "--memory-limit", "256M"});
   std::vector<char*> argv = {const_cast<char*>("nephele")};
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -120,6 +118,16 @@ bool runVerb(std::vector<std::string> arguments, std::string_view named) {
       message.find("this needs ") != message.npos || message.find(" cannot hold") != message.npos;
   checkMessage(message, isOfOutput ? "" : named);
   return false;
+}
+
+std::vector<std::string> linesOf(std::string_view text) {
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.emplace_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
 }
 
 bool runRender(std::vector<std::string> arguments, std::string_view named) {

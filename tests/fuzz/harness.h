@@ -46,6 +46,8 @@ bool runVerb(std::vector<std::string> arguments, std::string_view named);
 /// not say otherwise.
 bool runRender(std::vector<std::string> arguments, std::string_view named);
 
+std::vector<std::string> linesOf(std::string_view text);
+
 /// A file in this process's own folder in memory.
 std::string scratchPath(std::string_view name);
 

@@ -11,7 +11,7 @@ program=$1 folder=$2 seconds=$3
 shift 3
 mkdir -p "$folder/corpus" "$folder/findings" "$folder/logs"
 folder=$(cd "$folder" && pwd)
-[ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera ocio toml field felt calls
+[ $# -gt 0 ] || set -- obj ply stl off gltf glb vdb nvdb exr deep hdr png chan camera ocio toml field felt verbs calls
 
 rm -rf "$folder/seeds"
 "${program}_seeds" "$folder/seeds"
@@ -21,7 +21,7 @@ for files in "$here/../../data" ${FUZZ_FILES:-}; do
   for format in "$@"; do
     case $format in
       deep) extension=exr ;;
-      camera | field | calls) continue ;;
+      camera | field | verbs | calls) continue ;;
       *) extension=$format ;;
     esac
     mkdir -p "$folder/seeds/$format"
@@ -34,7 +34,7 @@ done
 # Inputs that take a processor of 2026 about 10 seconds, under the sanitizers.
 inputs_of() {
   case $1 in
-    deep) echo 150 ;;
+    deep | verbs) echo 150 ;;
     exr | nvdb | obj | ocio | vdb) echo 300 ;;
     hdr) echo 400 ;;
     camera | gltf | glb | ply | stl | png) echo 600 ;;

@@ -426,7 +426,7 @@ colorspaces:
 
 void writeTextSeeds(const std::string& parent) {
   const Folder chan(parent, "chan"), camera(parent, "camera"), toml(parent, "toml"), field(parent, "field"),
-      calls(parent, "calls");
+      verbs(parent, "verbs"), calls(parent, "calls");
   chan.write("a.chan", "# frames\n1 0 0 3 0 0 0 35\n2 0.5 0 3 10 -5 0 35\n4 1 0.25 3 20 -5 1 40\n");
   camera.write(
       "a.json",
@@ -457,6 +457,21 @@ void writeTextSeeds(const std::string& parent) {
       "options.txt",
       "cloud\n--resolution\n64\n--amplitude\n2.5%\n--billow\n0.5\n-o\na.vdb\n--sun\n30,20,3\n--size=64x48");
   field.write("cut.txt", "cut\na.obj\n-o\npieces\n--plane\n0,0,0,1,0,0\n--kerf\n1%\n--random-planes\n4");
+  for (const auto& [verb, options] : {std::pair{"levelset", "--half-width\n2"},
+                                      {"cloud", "--billow\n0.3\n--thin-out\n0.5"},
+                                      {"cloud", "--amplitude\nheight:0=1%,1=3%\n--advect\n2%"},
+                                      {"advect", "--steps\n2\n--dt\n0.5"},
+                                      {"wisps", "--guides\n2\n--clump\n0.5"},
+                                      {"mesh", "--adaptivity\n0.1"},
+                                      {"cut", "--kerf\n1%\n--explode\n0.2"},
+                                      {"transfer", "--method\nclosest"},
+                                      {"transform", "--rotate\n0,30,0\n--move\n1,0,0"},
+                                      {"render", "--view\n40,20\n--phase\nhg:0.5"},
+                                      {"render", "--camera\ncamera.json\n--frame\n1"},
+                                      {"turntable", "--step\n5%"},
+                                      {"info", "--self-intersections"}})
+    verbs.write(fmt::format("{}_{}.txt", verb, std::string_view(options).size()),
+                fmt::format("{}\n{}\n", verb, options));
   // By which meshes, volumes, pictures, deep pictures and outputs are written so that they can be read.
   constexpr std::size_t kPatterns[][2] = {{3, 4},  {5, 1}, {3, 0}, {7, 4}, {21, 1},
                                           {32, 3}, {1, 0}, {3, 2}, {1, 1}, {2, 2}};

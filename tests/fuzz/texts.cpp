@@ -22,6 +22,7 @@
 #include "nephele/render/scene/camera_file.h"
 #include "tests/fuzz/formats.h"
 #include "tests/fuzz/harness.h"
+#include "tests/fuzz/verb_calls.h"
 
 namespace nephele::fuzz {
 namespace {
@@ -65,14 +66,10 @@ void sample(const auto& field) {
 }
 
 const std::vector<apps::Verb>& verbs() {
-  using namespace nephele::apps;
-  static const std::vector<Verb> all = {levelsetVerb(), cloudVerb(),     advectVerb(),   wispsVerb(),
-                                        meshVerb(),     cutVerb(),       transferVerb(), transformVerb(),
-                                        renderVerb(),   turntableVerb(), feltVerb()};
+  static const std::vector<apps::Verb> all = apps::allVerbs();
   return all;
 }
 
-/// Parses arguments as a verb does; its body does not run.
 const std::vector<std::string>& verbNames() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
@@ -82,27 +79,11 @@ const std::vector<std::string>& verbNames() {
   return names;
 }
 
-/// Arguments that a verb cannot do without, and an output.
-std::vector<std::string> needed(const apps::Verb& verb) {
-  CLI::App app(verb.summary, verb.name);
-  const apps::BoundVerb bound = verb.bind(app);
-  std::vector<std::string> arguments;
-  for (const CLI::Option* option : app.get_options(
-           [](const CLI::Option* each) { return each->get_required() || each->get_name() == "--output"; })) {
-    const std::string name = option->get_name();
-    if (!option->get_positional()) arguments.push_back(name);
-    const bool isPicture = verb.name == "render" || verb.name == "turntable";
-    const bool isVolume = verb.name != "mesh" && verb.name != "transfer";
-    arguments.push_back(name == "action"     ? "check"
-                        : name == "--frames" ? "1-2"
-                        : name != "--output" ? "a.obj"
-                        : isPicture          ? "a.exr"
-                        : isVolume           ? "a.vdb"
-                                             : "b.obj");
-  }
-  return arguments;
+const apps::Verb& verbCalled(std::string_view name) {
+  return *std::ranges::find(verbs(), name, &apps::Verb::name);
 }
 
+/// Parses arguments as a verb does; its body does not run.
 void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
   CLI::App app(verb.summary, verb.name);
   const apps::BoundVerb bound = verb.bind(app);
@@ -165,8 +146,9 @@ bool useToml(const Input& input) {
       sample(layer.amplitude * layer.billow);
     }
   });
-  const apps::Verb& verb = verbs()[input.hash % verbs().size()];
-  std::vector<std::string> arguments = needed(verb);
+  const VerbCall& call = verbCalls()[input.hash % verbCalls().size()];
+  const apps::Verb& verb = verbCalled(call.verb);
+  std::vector<std::string> arguments = call.needed;
   arguments.insert(arguments.end(), {"--config", input.path});
   isRead = mayFailOrShow("", [&] { parse(verb, arguments); }) || isRead;
   mayFailOrShow(input.path, [&] {
@@ -210,22 +192,17 @@ bool useFieldTexts(const Input& input) {
         names.insert(FramePattern::parse(wedge->named(words, i, app)[1]).path(frame));
     expect(names.size() == 2 * wedge->size(), "two frames of a wedge are the same file");
   });
-  std::vector<std::string> lines;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    lines.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
+  std::vector<std::string> lines = linesOf(text);
   // CLI11 takes the first line of usage faults apart by itself; a file is not asked for.
   for (const std::string& line : lines)
     if (line.find("config") != line.npos) return isRead;
-  std::size_t verb = input.hash / 3 % verbs().size();
+  std::string_view verb = verbCalls()[input.hash / 3 % verbCalls().size()].verb;
   if (!lines.empty())
-    if (const auto named = std::ranges::find(verbNames(), lines.front()); named != verbNames().end()) {
-      verb = std::size_t(named - verbNames().begin());
+    if (const VerbCall* named = callOf(lines.front())) {
+      verb = named->verb;
       lines.erase(lines.begin());
     }
-  isRead |= mayFail("", [&] { parse(verbs()[verb], lines); });
+  isRead |= mayFail("", [&] { parse(verbCalled(verb), lines); });
   return isRead;
 }
 

@@ -118,6 +118,8 @@ class Options(Case):
             nephele.cloud(mesh, resolution=-4)
         with self.assertRaisesRegex(nephele.Error, "--noise.*perlin"):
             nephele.cloud(mesh, noise="nonsense")
+        with self.assertRaisesRegex(nephele.Error, r"'--noise=perlin\\x00x' has a byte of zero"):
+            nephele.cloud(mesh, noise="perlin\0x")
         with self.assertRaisesRegex(TypeError, "'half' is True or False"):
             nephele.cloud(mesh, half=3)
         with self.assertRaisesRegex(TypeError, "'resolution' needs a value"):

@@ -2,13 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <random>
 #include <regex>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/message_of.h"
 #include "tests/support/run_program.h"
@@ -190,6 +193,41 @@ TEST(VdbIo, HalfFloatsRoundToElevenBits) {
   const auto back = toBricks(readScalarGrid(folder.file("h.vdb")));
   EXPECT_NE(back->at({3, 4, 5}), bricks.at({3, 4, 5}));
   EXPECT_NEAR(back->at({3, 4, 5}), bricks.at({3, 4, 5}), bricks.at({3, 4, 5}) / 2048);
+}
+
+// IEEE half floats end at 65504 and are 2^-24 apart near zero.
+TEST(VdbIo, HalfFloatsAreRefusedWhereTheyLoseEverything) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("h.vdb");
+  const auto fog = [](float value, bool half) {
+    return toVdb(smallGrid(0.0f, value), {"density", Class::fogVolume, half});
+  };
+  const float most = valueRange(fog(1.0f, false)).max;
+  writeVdbFile(path, {fog(65504 / most * 0.999f, true)}, {});
+  writeVdbFile(path, {fog(1e6f, false)}, {});
+  const std::string tooLarge = messageOf([&] { writeVdbFile(path, {fog(1e6f, true)}, {}); });
+  EXPECT_NE(tooLarge.find("h.vdb: the grid 'density' has values up to"), std::string::npos) << tooLarge;
+
+  const auto voxels = [](float value) {
+    VoxelGrid<Vec3f> grid("v", 1.0, Vec3f{});
+    std::fill_n(grid.add({0, 0, 0}), kBrickSamples, Vec3f{0, value, 0});
+    return toVdb(std::move(grid), {"v", Class::unknown, true});
+  };
+  writeVdbFile(path, {voxels(-65504)}, {});
+  EXPECT_NE(messageOf([&] { writeVdbFile(path, {voxels(-1e5f)}, {}); }), "");
+
+  const auto ball = [](float voxelSize, bool half) {
+    return toVdb(
+        *bakeGrid(sphere({0, 0, 0}, 4 * voxelSize), {.voxelSize = voxelSize,
+                                                     .box = {{-8 * voxelSize, -8 * voxelSize, -8 * voxelSize},
+                                                             {8 * voxelSize, 8 * voxelSize, 8 * voxelSize}},
+                                                     .band = {-3 * voxelSize, 3 * voxelSize}}),
+        {"surface", Class::levelSet, half});
+  };
+  writeVdbFile(path, {ball(1e-4f, true)}, {});
+  writeVdbFile(path, {ball(1e-6f, false)}, {});
+  const std::string tooSmall = messageOf([&] { writeVdbFile(path, {ball(1e-6f, true)}, {}); });
+  EXPECT_NE(tooSmall.find("voxels of 1e-06"), std::string::npos) << tooSmall;
 }
 
 TEST(VdbIo, RefusesToMakeWhatFilesMustNotHold) {

@@ -202,6 +202,21 @@ TEST(CameraFile, WritesJsonThatItReadsBack) {
   expectSame(chan, parseCameraJson(cameraJsonText(chan), "b.json"));
 }
 
+// Places whose differences no number holds, and frames that twelve digits do not tell apart, were written so
+// that they could not be read.
+TEST(CameraFile, WrittenAtTheEndsOfItsRangesIsReadAgain) {
+  const CameraMotion motion =
+      parseChan("999999998.5 1e30 -1e30 0 0 0 0\n999999998.501 -1e30 1e30 0 0 0 0\n", "a.chan");
+  for (const CameraMotion& again :
+       {parseChan(chanText(motion, 1), "b.chan"), parseCameraJson(cameraJsonText(motion), "b.json")}) {
+    ASSERT_EQ(again.keys().size(), 2u);
+    for (const std::size_t i : {0, 1}) {
+      EXPECT_EQ(again.keys()[i].frame, motion.keys()[i].frame);
+      EXPECT_EQ(again.keys()[i].position, motion.keys()[i].position);
+    }
+  }
+}
+
 TEST(CameraFile, SaysWhatIsWrongWithAChanAndWhere) {
   const struct {
     const char *text, *message;
@@ -219,7 +234,11 @@ TEST(CameraFile, SaysWhatIsWrongWithAChanAndWhere) {
       {"1 0 0 0 0 0 0\n\n1 0 0 0 0 0 0\n", "a.chan:3: frame 1 comes after frame 1, but frames must increase"},
       {"1 0 0 0 0 0 0 30\n2 0 0 0 0 0 0 200\n",
        "a.chan:2: frame 2: fov must be from 1e-07 to 179.99999, got 200"},
-      {"-1e308 0 0 0 0 0 0 30\n", "a.chan:1: frame -1e+308: frames are from -1e+09 to 1e+09"}};
+      {"-1e308 0 0 0 0 0 0 30\n", "a.chan:1: frame -1e+308: frames are from -1e+09 to 1e+09"},
+      {"1 0 0 0 0 0 0\n1.0000001 0 0 0 0 0 0\n",
+       "a.chan:2: frame 1: comes after frame 1, but frames must increase, by 1e-06 at least"},
+      {"1 0 0 1e31 0 0 0\n",
+       "a.chan:1: frame 1: position must be from -1e+30 to 1e+30 along each axis, got 1e+31"}};
   for (const auto& c : cases) EXPECT_EQ(messageOf([&] { parseChan(c.text, "a.chan"); }), c.message);
 }
 
