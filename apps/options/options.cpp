@@ -59,7 +59,7 @@ CLI::Option* addLength(CLI::App& app, const std::string& name, const std::functi
           [name, set, sign, allowed](const std::string& text) {
             const auto length = parseLength(text);
             if (!length || (sign != Sign::any && length->value < 0) ||
-                (sign == Sign::positive && length->value == 0))
+                (sign == Sign::positive && !(float(length->value) > 0)))
               refuseValue(name, text, allowed);
             set(*length);
           },
@@ -90,7 +90,7 @@ CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& tar
       [&target, name](const std::string& text) {
         const bool relative = text.ends_with('x');
         const auto value = parseNumber(std::string_view(text).substr(0, text.size() - (relative ? 1 : 0)));
-        if (!value || *value <= 0)
+        if (!value || !(float(*value) > 0))
           refuseValue(name, text, "cycles > 0 per world unit (2.5) or per longest side (6x)");
         target = {*value, relative};
       },

@@ -10,7 +10,7 @@
 namespace nephele {
 
 struct DotVolumeOptions {
-  /// Edge of a voxel, world units, > 0. Voxel centres lie at integer multiples of it.
+  /// Edge of a voxel, world units, from 1e-12 to 1e12. Voxel centres lie at integer multiples of it.
   float voxelSize = 0.0f;
   /// Radius of dots that bring none of their own, world units, >= 0.
   float radius = 0.0f;

@@ -29,13 +29,19 @@ std::shared_ptr<BrickGrid> nearSurface(const ScalarField& level, BakeOptions spe
 ScalarField sweptDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,
                           const Progress& progress) {
   const auto near = nearSurface(level, spec, progress);
-  const auto source = detail::toOpenVdb(*near, detail::TreeValues::levelSet(*near, "surface"), "surface");
+  // In voxels: the sweep takes what is below a bound of its own for zero.
+  detail::TreeValues values = detail::TreeValues::levelSet(*near, "surface");
+  for (float* value : {&values.sign, &values.low, &values.high, &values.background}) *value /= spec.voxelSize;
+  const auto source = detail::toOpenVdb(*near, values, "surface");
+  const openvdb::math::Transform::Ptr inWorld = source->transformPtr();
+  source->setTransform(detail::uniformTransform(1));
   source->setGridClass(openvdb::GRID_LEVEL_SET);
   const float width = std::max(band.exterior, band.interior) / spec.voxelSize - kHalfWidthVoxels;
   const auto distance =
       openvdb::tools::dilateSdf(*openvdb::tools::sdfToSdf(*source), std::max(1, int(std::ceil(width))));
   progress.check();
-  return gridField(detail::bricksOf(*distance, -1.0f), Interpolation::tricubic);
+  distance->setTransform(inWorld);
+  return gridField(detail::bricksOf(*distance, -spec.voxelSize), Interpolation::tricubic);
 }
 
 ScalarField rebuiltDistance(const ScalarField& level, const BakeOptions& spec, const DistanceBand& band,

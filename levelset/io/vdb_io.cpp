@@ -183,6 +183,12 @@ void requireWritable(const std::vector<VdbGrid>& grids) {
                                                    printable(grid.getName()), grid.valueType()));
     require(names.insert(grid.getName()).second,
             fmt::format("two grids are called '{}'", printable(grid.getName())));
+    if (grid.transform().isLinear())
+      if (const double edge = std::cbrt(std::abs(detail::matrixOf(grid.transform()).det()));
+          !(edge >= detail::kLeastEdge))
+        throw Error(
+            fmt::format("the grid '{}' has voxels of {:.3g}, and files hold ones from {:g}; make them larger",
+                        printable(grid.getName()), edge, detail::kLeastEdge));
     requireHalfHolds(each);
   }
 }

@@ -11,6 +11,7 @@
 
 #include <openvdb/tools/VolumeToMesh.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -21,17 +22,32 @@
 
 namespace nephele {
 
+namespace {
+
+/// Makes the largest value one to two: OpenVDB merges nothing where values are tiny. A power of two, so that
+/// nothing is rounded.
+float unitOfValues(const BrickGrid& grid) {
+  float most = std::fabs(grid.background());
+  for (const float value : grid.values()) most = std::max(most, std::fabs(value));
+  return most > 0 && std::isfinite(most) ? std::ldexp(1.0f, -std::ilogb(most)) : 1.0f;
+}
+
+}  // namespace
+
 Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
   require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + std::to_string(isovalue));
   require(adaptivity >= 0 && adaptivity <= 1,
           "adaptiveMesh: adaptivity must be in [0, 1], got " + std::to_string(adaptivity));
-  const auto values = detail::toOpenVdb(grid, detail::TreeValues::negated(grid.background()), "");
+  const float unit = unitOfValues(grid);
+  detail::TreeValues negated = detail::TreeValues::negated(grid.background() * unit);
+  negated.sign *= unit;
+  const auto values = detail::toOpenVdb(grid, negated, "");
   values->setGridClass(openvdb::GRID_LEVEL_SET);
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;
   std::vector<openvdb::Vec4I> quads;
   try {
-    openvdb::tools::volumeToMesh(*values, points, triangles, quads, -isovalue, adaptivity);
+    openvdb::tools::volumeToMesh(*values, points, triangles, quads, -isovalue * double(unit), adaptivity);
   } catch (const openvdb::Exception& problem) {
     throw Error("adaptiveMesh: " + std::string(problem.what()));
   }

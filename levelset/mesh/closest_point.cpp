@@ -14,14 +14,14 @@ namespace nephele {
 
 namespace detail {
 
-std::vector<TriangleDisc> discsOf(const Mesh& mesh, const Vec3d& centre) {
+std::vector<TriangleDisc> discsOf(const Mesh& mesh, const BoxUnits& units) {
   std::vector<TriangleDisc> discs(mesh.faceCount());
-  const float slack = 1e-6f * boundingBox(mesh).longestSide();
+  const float slack = 1e-6f * float(units.own(boundingBox(mesh).longestSide()));
   for (std::size_t t = 0; t < mesh.faceCount(); ++t) {
     // In double precision: the plane of a sliver would tilt with its rounded corners.
-    const Vec3d a = mesh.positions[mesh.corners[3 * t]] - centre,
-                b = mesh.positions[mesh.corners[3 * t + 1]] - centre,
-                c = mesh.positions[mesh.corners[3 * t + 2]] - centre;
+    const Vec3d a = units.own(mesh.positions[mesh.corners[3 * t]]),
+                b = units.own(mesh.positions[mesh.corners[3 * t + 1]]),
+                c = units.own(mesh.positions[mesh.corners[3 * t + 2]]);
     const Vec3d middle = (a + b + c) * (1.0 / 3.0);
     const double radius = std::max({length(a - middle), length(b - middle), length(c - middle)});
     const Vec3d normal = cross(b - a, c - a);

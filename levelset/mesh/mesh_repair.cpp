@@ -41,8 +41,8 @@ std::string counted(std::size_t count, const char* one, const char* many) {
   return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
-/// Beyond it cubes of lengths leave the range of float, in which boxes and fields are held.
-constexpr double kLargestSide = 1e12;
+/// Beyond them cubes of lengths leave the range of float, in which boxes and fields are held.
+constexpr double kSmallestSide = 1e-9, kLargestSide = 1e12;
 
 std::string joined(const std::vector<std::string>& list) {
   std::string text;
@@ -67,10 +67,11 @@ class Ladder {
     require(result_.before.faces > 0, "mesh repair: the mesh has no faces");
     const double side = double(result_.before.box.longestSide());
     require(side > 0, "mesh repair: the mesh is a single point");
-    require(
-        std::isfinite(result_.before.area) && side <= kLargestSide,
-        fmt::format("mesh repair: the mesh is too large: its longest side is {:.3g}, allowed: up to {:.3g}",
-                    side, kLargestSide));
+    const bool isTooLarge = !std::isfinite(result_.before.area) || !(side <= kLargestSide);
+    if (isTooLarge || side < kSmallestSide)
+      throw Error(fmt::format(
+          "mesh repair: the mesh is too {}: its longest side is {:.3g}, allowed: from {:g} to {:g}",
+          isTooLarge ? "large" : "small", side, kSmallestSide, kLargestSide));
     result_.mesh = result_.before.mergedVertices > 0 ? detail::withMergedPositions(source_) : source_;
     // Before polygons become fans: two that coincide may be cut along different diagonals.
     if (options_.mode == MeshRepairOptions::Mode::automatic && result_.before.duplicateFaces > 0)

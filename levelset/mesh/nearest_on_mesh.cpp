@@ -1,7 +1,6 @@
 // Nearest point of a mesh by Embree's point queries.
 //
-// Embree keeps the triangles relative to the centre of their box, so that floats resolve the mesh and not its
-// place in the world.
+// Embree keeps the triangles in BoxUnits, so that floats resolve the mesh and not its place in the world.
 #include "nephele/levelset/mesh/nearest_on_mesh.h"
 
 #include <embree3/rtcore.h>
@@ -18,9 +17,13 @@
 namespace nephele {
 
 struct NearestOnMesh::Hierarchy {
+  explicit Hierarchy(const Box& box) : units(box) {}
+  Hierarchy(const Hierarchy&) = delete;
+  Hierarchy& operator=(const Hierarchy&) = delete;
+
+  BoxUnits units;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  Vec3d centre;
   const Vec3f* positions = nullptr;
   const std::uint32_t* corners = nullptr;
 
@@ -68,13 +71,13 @@ struct NearestOnMesh::Hierarchy {
 };
 
 NearestOnMesh::NearestOnMesh(const Mesh& mesh, const Progress& progress)
-    : hierarchy_(std::make_unique<Hierarchy>()), box_(boundingBox(requireValid(mesh))) {
+    : box_(boundingBox(requireValid(mesh))) {
   detail::requireTriangles(mesh);
+  hierarchy_ = std::make_unique<Hierarchy>(box_);
   Hierarchy& h = *hierarchy_;
   h.device = rtcNewDevice(nullptr);
   require(h.device != nullptr, "closest point: Embree cannot be started");
   h.scene = rtcNewScene(h.device);
-  h.centre = Vec3d(box_.center());
   const RTCGeometry geometry = rtcNewGeometry(h.device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.positions.size()));
@@ -84,11 +87,12 @@ NearestOnMesh::NearestOnMesh(const Mesh& mesh, const Progress& progress)
     rtcReleaseGeometry(geometry);
     throw Error(fmt::format("closest point: no memory for {} triangles", mesh.faceCount()));
   }
-  for (std::size_t i = 0; i < mesh.positions.size(); ++i) positions[i] = Vec3f(mesh.positions[i] - h.centre);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+    positions[i] = Vec3f(h.units.own(mesh.positions[i]));
   std::copy(mesh.corners.begin(), mesh.corners.end(), corners);
   h.positions = positions;
   h.corners = corners;
-  h.discs = detail::discsOf(mesh, h.centre);
+  h.discs = detail::discsOf(mesh, h.units);
   rtcSetGeometryPointQueryFunction(geometry, Hierarchy::visit);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(h.scene, geometry);
@@ -106,8 +110,10 @@ NearestOnMesh::NearestOnMesh(const Mesh& mesh, const Progress& progress)
 NearestOnMesh::~NearestOnMesh() = default;
 
 std::optional<NearestOnMesh::Hit> NearestOnMesh::nearest(const Vec3f& p, float radius) const {
-  const Vec3f local(Vec3d(p) - hierarchy_->centre);
+  const BoxUnits& units = hierarchy_->units;
+  const Vec3f local(units.own(Vec3d(p)));
   if (!isFinite(local)) return std::nullopt;
+  radius = float(units.own(radius));
   RTCPointQuery query;
   query.x = local.x;
   query.y = local.y;
@@ -119,16 +125,17 @@ std::optional<NearestOnMesh::Hit> NearestOnMesh::nearest(const Vec3f& p, float r
   Hierarchy::Answer answer{hierarchy_.get(), {}, radius * radius};
   rtcPointQuery(hierarchy_->scene, &query, &context, nullptr, &answer);
   if (answer.triangle == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{Vec3f(Vec3d(local + answer.offset) + hierarchy_->centre), std::sqrt(answer.squared),
+  return Hit{Vec3f(units.world(Vec3d(local + answer.offset))), float(units.world(std::sqrt(answer.squared))),
              answer.triangle};
 }
 
 std::optional<std::vector<std::uint32_t>> NearestOnMesh::trianglesNear(const Vec3f& p, float radius,
                                                                        std::size_t most) const {
   std::vector<std::uint32_t> triangles;
-  const Vec3f local(Vec3d(p) - hierarchy_->centre);
+  const BoxUnits& units = hierarchy_->units;
+  const Vec3f local(units.own(Vec3d(p)));
   if (!isFinite(local)) return triangles;
-  RTCPointQuery query{local.x, local.y, local.z, 0.0f, radius};
+  RTCPointQuery query{local.x, local.y, local.z, 0.0f, float(units.own(radius))};
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   Hierarchy::Answer answer{hierarchy_.get(), {}, 0.0f, RTC_INVALID_GEOMETRY_ID, &triangles, most};

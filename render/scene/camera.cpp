@@ -185,14 +185,14 @@ Camera Camera::framing(std::span<const Vec3f> points, float azimuthDegrees, floa
   }
   const auto& [east, west, north, south, near, none] = reach;
   const double nearest = -near;
-  double z = nearest - std::max(extent, 1e-6);
+  // A single point, or points on one line of sight, would put the camera onto them.
+  const double apart = extent > 0 ? 1e-3 * extent : 1e-6;
+  double z = nearest - std::max(extent, apart);
   if (!parallel) {
-    // A single point, or points on one line of sight, would put the camera onto them.
-    z = std::min(
-        {-(east + west) / (2 * tx), -(north + south) / (2 * ty), nearest - std::max(1e-3 * extent, 1e-6)});
+    z = std::min({-(east + west) / (2 * tx), -(north + south) / (2 * ty), nearest - apart});
   } else if (!frame.orthographicWidth) {
     const double width = std::max(east + west, (north + south) * frame.width / frame.height);
-    camera.setWidth(std::max({width, 1e-3 * extent, 1e-6}) / (1 - 2 * margin));
+    camera.setWidth(std::max(width, apart) / (1 - 2 * margin));
   }
   pose.position =
       first + pose.right * ((east - west) / 2) + pose.up * ((north - south) / 2) + pose.forward * z;

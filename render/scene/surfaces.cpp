@@ -17,6 +17,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nephele/modeling/base/box_units.h"
 #include "nephele/modeling/base/error.h"
 
 namespace nephele {
@@ -83,7 +84,7 @@ struct Surfaces::Scene {
   std::atomic<std::ptrdiff_t> bytes{0};
   RTCDevice device = nullptr;
   RTCScene seen = nullptr, shading = nullptr;
-  Vec3d centre;
+  BoxUnits units;
   /// Per object and vertex.
   std::vector<std::vector<Vec3f>> normals;
 
@@ -97,13 +98,13 @@ struct Surfaces::Scene {
   template <class EmbreeRay>
   [[nodiscard]] bool set(EmbreeRay& out, const Ray& ray, double distance) const {
     constexpr float kFarthest = 1e18f;
-    const Vec3f origin(ray.origin - centre), direction(ray.direction);
+    const Vec3f origin(units.own(ray.origin)), direction(ray.direction);
     for (int axis = 0; axis != 3; ++axis)
       if (!(std::abs(origin[axis]) < kFarthest)) return false;
     out.org_x = origin.x, out.org_y = origin.y, out.org_z = origin.z;
     out.dir_x = direction.x, out.dir_y = direction.y, out.dir_z = direction.z;
     out.tnear = 0;
-    out.tfar = float(distance);
+    out.tfar = float(units.own(distance));
     out.time = 0;
     out.mask = ~0u;
     out.id = out.flags = 0;
@@ -134,7 +135,7 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects, const Progress& progress)
     if (object.castsShadows) shadeBox_ = shadeBox_.including(box);
   }
   Scene& scene = *scene_;
-  scene.centre = (Vec3d(box_.min) + Vec3d(box_.max)) * 0.5;
+  scene.units = BoxUnits(box_);
   clearance_ = 1e-5 * double(std::max(box_.longestSide(), 1e-30f));
   scene.device = rtcNewDevice(nullptr);
   require(scene.device != nullptr, "objects: Embree cannot be started");
@@ -165,7 +166,7 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects, const Progress& progress)
       throw Error(fmt::format("objects: no memory for {} triangles", object.mesh.faceCount()));
     }
     for (std::size_t p = 0; p != object.mesh.positions.size(); ++p)
-      positions[p] = Vec3f(object.mesh.positions[p] - scene.centre);
+      positions[p] = Vec3f(scene.units.own(object.mesh.positions[p]));
     std::copy(object.mesh.corners.begin(), object.mesh.corners.end(), corners);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene.seen, geometry, unsigned(i));
@@ -199,7 +200,7 @@ std::optional<Surfaces::Hit> Surfaces::hit(const Ray& ray) const {
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   const SurfaceObject& object = objects_[query.hit.geomID];
   Hit result;
-  result.distance = query.ray.tfar;
+  result.distance = scene_->units.world(query.ray.tfar);
   result.normal = normalize(Vec3f{query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z});
   const float b = query.hit.u, c = query.hit.v, a = 1 - b - c;
   const Vec3f flat = result.normal;
@@ -248,7 +249,7 @@ double Surfaces::distanceToShade(const Ray& ray) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene_->shading, &context, &query);
-  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? infinite : double(query.ray.tfar);
+  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? infinite : scene_->units.world(query.ray.tfar);
 }
 
 std::size_t Surfaces::memoryBytes() const {

@@ -250,13 +250,25 @@ TEST(Program, ConfigFilesThatAreNoneAreRefused) {
 
 TEST(Program, MeshesBeyondTheRangeOfTheirNumbersAreRefusedByName) {
   const TemporaryFolder folder;
-  std::ofstream(folder.file("far.obj")) << "v 0 0 0\nv 1e39 0 0\nv 0 1e39 0\nv 0 0 1e39\n"
-                                           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-  const ProgramResult result =
-      runProgram("levelset " + folder.file("far.obj") + " --repair wrap -o " + folder.file("out.vdb"));
-  EXPECT_EQ(result.exitCode, 1);
-  EXPECT_NE(result.errors.find("far.obj"), std::string::npos) << result.errors;
-  EXPECT_NE(result.errors.find("too large"), std::string::npos) << result.errors;
+  const auto tetrahedron = [&](const std::string& name, const std::string& side) {
+    std::ofstream(folder.file(name)) << "v 0 0 0\nv " << side << " 0 0\nv 0 " << side << " 0\nv 0 0 " << side
+                                     << "\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    return folder.file(name);
+  };
+  const std::string out = " -o " + folder.file("out.vdb"), far = tetrahedron("far.obj", "1e39"),
+                    tiny = tetrahedron("tiny.obj", "1e-20"), small = tetrahedron("small.obj", "1e-8");
+  for (const auto& [arguments, part] :
+       {std::pair{"levelset " + far + " --repair wrap" + out, "far.obj: mesh repair: the mesh is too large"},
+        {"levelset " + tiny + out, "tiny.obj: mesh repair: the mesh is too small: its longest side is 1e-20"},
+        {"cloud " + tiny + out, "tiny.obj: mesh repair: the mesh is too small"},
+        {"cut " + tiny + " --random-planes 1 -o " + folder.file("p"),
+         "tiny.obj: mesh repair: the mesh is too small"},
+        {"wisps " + tiny + " --dots 100" + out, "tiny.obj: dots: voxels may be from 1e-12 to 1e+12 wide"}}) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.exitCode, 1) << arguments;
+    EXPECT_NE(result.errors.find(part), std::string::npos) << arguments << "\n" << result.errors;
+  }
+  EXPECT_EQ(runProgram("levelset " + small + " --resolution 32" + out).exitCode, 0);
 }
 
 TEST(Program, NamesInAnyEncodingAreWrittenAndStatisticsStayJson) {

@@ -6,10 +6,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/render/image/exr_io.h"
 #include "tests/support/density.h"
 #include "tests/support/run_program.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele::test {
 namespace {
@@ -67,6 +69,34 @@ TEST_F(RenderVerb, TakesQualitiesWhereNothingElseIsSaid) {
   EXPECT_EQ(redOf("--light-quality final"), redOf("--quality final"));
   EXPECT_NE(redOf("--quality draft"), redOf(""));
   EXPECT_EQ(runProgram("render " + fog() + " -o " + folder.file("b.exr") + " --light-quality 9").exitCode, 2);
+}
+
+TEST_F(RenderVerb, ShowsTinyAndVastThingsAsOthers) {
+  const TemporaryFolder folder;
+  const Mesh mesh = icosphere(1.0, 3);
+  // Powers of two round nothing; the picture is kept in 11 bits.
+  std::vector<std::vector<float>> clouds, surfaces;
+  for (const int power : {0, -28, 28}) {
+    Mesh scaled = mesh;
+    for (Vec3d& p : scaled.positions) p = p * std::ldexp(1.0, power);
+    writeMesh(folder.file("ball.ply"), scaled);
+    const std::string look = " --size 24x16 --light-quality draft --aov none -o " + folder.file("a.exr");
+    for (const std::string& call :
+         {"cloud " + folder.file("ball.ply") + " --resolution 24 --layers 1 -o " + folder.file("c.vdb"),
+          "render " + folder.file("c.vdb") + look}) {
+      const ProgramResult result = runProgram(call);
+      ASSERT_EQ(result.exitCode, 0) << result.errors;
+    }
+    clouds.push_back(readImage(folder.file("a.exr")).channel("R").values);
+    const ProgramResult result = runProgram("render " + folder.file("ball.ply") + look);
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+    surfaces.push_back(readImage(folder.file("a.exr")).channel("R").values);
+  }
+  EXPECT_GT(*std::ranges::max_element(clouds[0]), 0.1f);
+  for (const auto* pictures : {&clouds, &surfaces})
+    for (const std::size_t other : {1, 2})
+      for (std::size_t i = 0; i < (*pictures)[0].size(); ++i)
+        EXPECT_NEAR((*pictures)[other][i], (*pictures)[0][i], 2e-3) << other << ", " << i;
 }
 
 TEST_F(RenderVerb, WritesAPictureAPreviewAndStatistics) {

@@ -103,6 +103,21 @@ TEST_F(TransferVerb, SaysWhereAMapIsTornAndPaintsIt) {
   EXPECT_LT(double(stats()["worst_region"]["share"]), 0.005);
 }
 
+// Products of lengths of tiny meshes have no place in single precision.
+TEST_F(TransferVerb, IsAsGoodInAnyUnits) {
+  ASSERT_EQ(transfer(sphere_, tori_, withStats("out.obj") + "--align none --method closest").exitCode, 0);
+  const auto asTheyAre = stats();
+  for (const double scale : {1e-9, 1e9}) {
+    writeMesh(file("sphere.obj"), turned(readMesh(sphere_), 0, scale, {}));
+    writeMesh(file("tori.obj"), turned(readMesh(tori_), 0, scale, {}));
+    const ProgramResult result = transfer(file("sphere.obj"), file("tori.obj"),
+                                          withStats("out.obj") + "--align none --method closest");
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+    for (const char* name : {"flipped_fraction", "degenerate_fraction", "coverage"})
+      EXPECT_NEAR(double(stats()[name]), double(asTheyAre[name]), 0.005) << name << " at " << scale;
+  }
+}
+
 TEST_F(TransferVerb, SmearsNoFaceOverTheSeam) {
   for (const char* options : {"--align none --quality fast", "--quality fast", "--method closest"}) {
     ASSERT_EQ(transfer(sphere_, tori_, withStats("out.ply") + options).exitCode, 0);

@@ -306,9 +306,7 @@ std::vector<std::int64_t> checkGrid(FileBytes& bytes, const openvdb::GridBase& g
   try {
     openvdb::math::Transform transform;
     transform.read(stream);
-    // Voxels of whose edges single precision cannot hold the cube.
-    constexpr double kLeast = 1e-12;
-    if (transform.isLinear() && !(std::cbrt(std::abs(matrixOf(transform).det())) >= kLeast))
+    if (transform.isLinear() && !(std::cbrt(std::abs(matrixOf(transform).det())) >= kLeastEdge))
       throw Error("its transform has no inverse, or its voxels are too small");
   } catch (const openvdb::Exception&) {
     throw Error("its transform has no inverse, or its voxels are too small");

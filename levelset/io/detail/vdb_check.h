@@ -18,6 +18,9 @@ namespace nephele::detail {
 /// each twice while it reads.
 inline constexpr std::int64_t kLongestText = std::int64_t{64} << 20;
 
+/// The shortest edge of a voxel whose cube single precision holds well.
+inline constexpr double kLeastEdge = 1e-12;
+
 /// Names and values of metadata: lengths that do not fit are found before anything is allocated for them.
 /// What tells where delayed loading finds its blocks is hidden from OpenVDB, which would trust its contents.
 void checkMetadata(FileBytes& bytes);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "nephele/modeling/base/box_units.h"
 #include "nephele/modeling/base/mesh.h"
 
 namespace nephele::detail {
@@ -58,8 +59,8 @@ struct TriangleDisc {
   }
 };
 
-/// Those of all triangles, relative to `centre`.
-std::vector<TriangleDisc> discsOf(const Mesh& mesh, const Vec3d& centre);
+/// Those of all triangles.
+std::vector<TriangleDisc> discsOf(const Mesh& mesh, const BoxUnits& units);
 
 /// @throws Error if the mesh has no faces, is not triangulated or has positions that are not finite.
 void requireTriangles(const Mesh& mesh);

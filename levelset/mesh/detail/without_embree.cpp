@@ -10,11 +10,10 @@
 namespace nephele {
 
 struct NearestOnMesh::Hierarchy {
-  explicit Hierarchy(const Mesh& mesh)
-      : centre(Vec3d(boundingBox(mesh).center())), discs(detail::discsOf(mesh, centre)) {
+  explicit Hierarchy(const Mesh& mesh) : units(boundingBox(mesh)), discs(detail::discsOf(mesh, units)) {
     std::vector<Vec3d> places;
     for (const Vec3d& p : mesh.positions) {
-      positions.push_back(Vec3f(p - centre));
+      positions.push_back(Vec3f(units.own(p)));
       places.push_back(Vec3d(positions.back()));
     }
     for (std::size_t c = 0; c != mesh.corners.size(); c += 3)
@@ -22,7 +21,7 @@ struct NearestOnMesh::Hierarchy {
     tree.emplace(places, triangles, 0, std::uint32_t(triangles.size()));
   }
 
-  Vec3d centre;
+  BoxUnits units;
   std::vector<detail::TriangleDisc> discs;
   std::vector<Vec3f> positions;
   std::vector<detail::TriangleIndices> triangles;
@@ -40,8 +39,9 @@ NearestOnMesh::~NearestOnMesh() = default;
 
 std::optional<NearestOnMesh::Hit> NearestOnMesh::nearest(const Vec3f& p, float radius) const {
   const Hierarchy& h = *hierarchy_;
-  const Vec3f local(Vec3d(p) - h.centre);
+  const Vec3f local(h.units.own(Vec3d(p)));
   if (!isFinite(local)) return std::nullopt;
+  radius = float(h.units.own(radius));
   float squared = radius * radius;
   Vec3f offset;
   std::optional<std::uint32_t> nearest;
@@ -61,15 +61,16 @@ std::optional<NearestOnMesh::Hit> NearestOnMesh::nearest(const Vec3f& p, float r
     reach = std::sqrt(double(squared)) * kSlack;
   });
   if (!nearest) return std::nullopt;
-  return Hit{Vec3f(Vec3d(local + offset) + h.centre), std::sqrt(squared), *nearest};
+  return Hit{Vec3f(h.units.world(Vec3d(local + offset))), float(h.units.world(std::sqrt(squared))), *nearest};
 }
 
 std::optional<std::vector<std::uint32_t>> NearestOnMesh::trianglesNear(const Vec3f& p, float radius,
                                                                        std::size_t most) const {
   const Hierarchy& h = *hierarchy_;
   std::vector<std::uint32_t> triangles;
-  const Vec3f local(Vec3d(p) - h.centre);
+  const Vec3f local(h.units.own(Vec3d(p)));
   if (!isFinite(local)) return triangles;
+  radius = float(h.units.own(radius));
   h.tree->visitNear(Vec3d(local), double(radius), [&](std::uint32_t triangle, double& reach) {
     if (h.discs[triangle].isBeyond(local, radius)) return;
     triangles.push_back(triangle);

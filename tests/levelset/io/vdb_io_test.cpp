@@ -196,7 +196,7 @@ TEST(VdbIo, HalfFloatsRoundToElevenBits) {
 }
 
 // IEEE half floats end at 65504 and are 2^-24 apart near zero.
-TEST(VdbIo, HalfFloatsAreRefusedWhereTheyLoseEverything) {
+TEST(VdbIo, RefusesValuesAndVoxelsThatFilesDoNotHold) {
   const TemporaryFolder folder;
   const std::string path = folder.file("h.vdb");
   const auto fog = [](float value, bool half) {
@@ -226,6 +226,9 @@ TEST(VdbIo, HalfFloatsAreRefusedWhereTheyLoseEverything) {
   };
   writeVdbFile(path, {ball(1e-4f, true)}, {});
   writeVdbFile(path, {ball(1e-6f, false)}, {});
+  writeVdbFile(path, {ball(2e-12f, false)}, {});
+  const std::string tiny = messageOf([&] { writeVdbFile(path, {ball(5e-13f, false)}, {}); });
+  EXPECT_NE(tiny.find("voxels of 5e-13, and files hold ones from 1e-12"), std::string::npos) << tiny;
   const std::string tooSmall = messageOf([&] { writeVdbFile(path, {ball(1e-6f, true)}, {}); });
   EXPECT_NE(tooSmall.find("voxels of 1e-06"), std::string::npos) << tooSmall;
 }

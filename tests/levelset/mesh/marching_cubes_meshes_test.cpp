@@ -7,12 +7,14 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/levelset/mesh/adaptive_mesh.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/mesh_to_level_set.h"
+#include "nephele/modeling/shape/shapes.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/test_data.h"
 
@@ -193,6 +195,26 @@ TEST(AdaptiveMesh, HasFewerFacesWithMoreAdaptivity) {
   const Mesh coarse = adaptiveMesh(*levelSet, 0, 0.5);
   EXPECT_LT(2 * coarse.faceCount(), fine.faceCount());
   EXPECT_NEAR(signedVolume(coarse) / signedVolume(fine), 1, 0.01);
+}
+
+// Powers of two round nothing, so that all is the same but for the unit.
+TEST(AdaptiveMesh, HasTheSameFacesInAnyUnits) {
+  const auto meshOf = [](int power) {
+    const float radius = std::ldexp(1.0f, power), side = 1.25f * radius, voxel = radius / 16;
+    return adaptiveMesh(
+        *bakeGrid(sphere({0, 0, 0}, radius), {.voxelSize = voxel,
+                                              .box = {{-side, -side, -side}, {side, side, side}},
+                                              .band = {-3 * voxel, 3 * voxel}}),
+        0, 0.5);
+  };
+  const Mesh mesh = meshOf(0);
+  for (const int power : {-30, 30}) {
+    const Mesh other = meshOf(power);
+    EXPECT_EQ(other.corners, mesh.corners) << power;
+    ASSERT_EQ(other.positions.size(), mesh.positions.size()) << power;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+      EXPECT_EQ(other.positions[i], mesh.positions[i] * std::ldexp(1.0, power));
+  }
 }
 
 TEST(AdaptiveMesh, TakesDensitiesAsInsideWhereTheyAreHigh) {

@@ -283,6 +283,21 @@ TEST(ClosestPoint, SliversAreNoExceptions) {
                 bruteForceDistance(mesh, Vec3d(points[i])), 3e-6);
 }
 
+// Powers of two round nothing, so that all is the same but for the unit.
+TEST(ClosestPoint, OfTinyAndVastMeshesIsThatOfOthersScaled) {
+  const Mesh mesh = icosphere(1.0, 3);
+  const VectorField nearest = closestPoint(mesh);
+  const Points points = randomPoints({{-2, -2, -2}, {2, 2, 2}}, 100, 13);
+  for (const int power : {-90, -30, 50}) {
+    Mesh scaled = mesh;
+    for (Vec3d& p : scaled.positions) p = p * std::ldexp(1.0, power);
+    const VectorField nearestOfScaled = closestPoint(scaled);
+    const float unit = std::ldexp(1.0f, power);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_EQ(nearestOfScaled(points[i] * unit), nearest(points[i]) * unit) << power;
+  }
+}
+
 TEST(ClosestPoint, OfPointsThatAreNotFiniteIsNan) {
   const VectorField nearest = closestPoint(icosphere(1.0, 1));
   EXPECT_TRUE(std::isnan(nearest({NAN, 0, 0}).x));

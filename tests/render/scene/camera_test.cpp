@@ -302,6 +302,19 @@ TEST(MotionBlur, FollowsACameraThatTurns) {
   EXPECT_FALSE(camera.withShutter({}).isMoving());
 }
 
+TEST(Camera, FramesWhatIsTinyAsItFramesTheRest) {
+  const std::vector<Vec3f> points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 1}};
+  for (const Camera::Frame& frame : {kFrame, kParallel}) {
+    const Camera camera = Camera::framing(points, 30, 20, frame);
+    for (const float unit : {1e-12f, 1e12f}) {
+      std::vector<Vec3f> scaled;
+      for (const Vec3f& point : points) scaled.push_back(point * unit);
+      const Camera other = Camera::framing(scaled, 30, 20, frame);
+      EXPECT_NEAR(length(other.position() * (1.0 / double(unit)) - camera.position()), 0, 1e-5) << unit;
+    }
+  }
+}
+
 TEST(Camera, FramesTheOutermostPointsAsItFramesAll) {
   std::vector<Vec3f> points;
   for (int i = 0; i != 500; ++i)

@@ -69,10 +69,35 @@ TEST(Surfaces, AreHitWhereTheyAre) {
   EXPECT_FALSE(surfaces.occluded({{0, 0, 7}, {0, 0, -1}}, 8));
 }
 
+// Powers of two round nothing, so that all is the same but for the unit.
+TEST(Surfaces, AreHitAlikeHoweverTinyOrVast) {
+  const auto tilted = [](double unit) {
+    Mesh mesh = square(0, 3);
+    for (Vec3d& p : mesh.positions) p = Vec3d{p.x, p.y, 0.25 * p.x} * unit;
+    return Surfaces({{.mesh = mesh}});
+  };
+  const Ray ray{{0.3, 0.4, 7}, {0, 0, -1}};
+  const auto hit = tilted(1).hit(ray);
+  ASSERT_TRUE(hit);
+  // By hand: the plane z = x / 4.
+  EXPECT_NEAR(hit->distance, 7 - 0.075, 1e-5);
+  for (const int power : {-100, -40, 60}) {
+    const double unit = std::ldexp(1.0, power);
+    const Surfaces surfaces = tilted(unit);
+    const Ray scaled{ray.origin * unit, ray.direction};
+    const auto same = surfaces.hit(scaled);
+    ASSERT_TRUE(same) << power;
+    EXPECT_EQ(same->distance, hit->distance * unit) << power;
+    EXPECT_EQ(same->normal, hit->normal) << power;
+    EXPECT_TRUE(surfaces.occluded(scaled, 8 * unit));
+    EXPECT_FALSE(surfaces.occluded(scaled, 6 * unit));
+  }
+}
+
 TEST(Surfaces, AreNotMetFromFartherAwayThanFloatsTell) {
-  // Embree ends the program where rays begin beyond 1.8e18 from what it holds.
+  // Embree ends the program where rays begin beyond 1.8e18 from what it holds, in units of about its size.
   const Surfaces surfaces({{square(0)}});
-  for (const double away : {1e20, 1e30, 1e300}) {
+  for (const double away : {1e21, 1e30, 1e300}) {
     const Ray ray{{0.3, 0.4, away}, {0, 0, -1}};
     EXPECT_FALSE(surfaces.hit(ray));
     EXPECT_FALSE(surfaces.occluded(ray, INFINITY));
