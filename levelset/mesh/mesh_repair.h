@@ -93,7 +93,8 @@ struct RepairedMesh {
 /// of the mesh. Corner attributes and groups survive until faces are added: a mesh with filled holes or
 /// wrapped has none.
 /// @throws Error saying what is wrong and which option would allow it (mode off on an open mesh; a flat mesh
-/// without volume; a shell thinner than voxels; a longest side outside 1e-9 to 1e12; nothing left); Cancelled.
+/// without volume; a shell thinner than voxels; a longest side outside 1e-9 to 1e12; nothing left);
+/// Cancelled.
 RepairedMesh repairMesh(const Mesh& mesh, const MeshRepairOptions& options = {},
                         const Progress& progress = silent());
 
