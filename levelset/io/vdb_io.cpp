@@ -154,9 +154,9 @@ std::array<VdbGrid, 3> readVectorGrid(const std::string& path, const std::string
   failReading(path, fmt::format("no grid '{}'; {}", name, listOf(wrapped(grids))));
 }
 
-/// Values that 16 bit floats do not hold would become infinite, and a level set of tiny voxels all zeros.
+/// Values that 16 bit floats do not hold would become infinite, and those of a tiny level set all zeros.
 void requireHalfHolds(const VdbGrid& grid) {
-  constexpr float kMost = 65504, kApart = 6e-8f, kLeastVoxel = 500 * kApart;
+  constexpr float kMost = 65504, kApart = 6e-8f, kLeastBand = 1500 * kApart;
   const VdbGridInfo info = describe(grid);
   if (!info.halfFloat) return;
   const VdbValueRange range = valueRange(grid);
@@ -166,11 +166,11 @@ void requireHalfHolds(const VdbGrid& grid) {
         fmt::format("the grid '{}' has values up to {:.6g}, and 16 bit floats end at {:g}; write 32 bit "
                     "floats, without --half",
                     printable(info.name), most, kMost));
-  if (info.gridClass == VdbGridInfo::Class::levelSet && info.voxelSize.x < kLeastVoxel)
-    throw Error(
-        fmt::format("the grid '{}' has voxels of {:.3g}, too small for 16 bit floats, which are {:g} apart; "
-                    "write 32 bit floats, without --half",
-                    printable(info.name), info.voxelSize.x, kApart));
+  if (info.gridClass == VdbGridInfo::Class::levelSet && most > 0 && most < kLeastBand)
+    throw Error(fmt::format(
+        "the grid '{}' has distances up to {:.3g}, and 16 bit floats are {:g} apart; write 32 bit "
+        "floats, without --half",
+        printable(info.name), most, kApart));
 }
 
 void requireWritable(const std::vector<VdbGrid>& grids) {

@@ -131,7 +131,7 @@ VoxelGrid<Vec3f> toVectorVoxels(const VdbGrid& grid);
 
 /// Of grids that were read and are to be written again. @throws Error naming a grid of points, whose values
 /// are not read, two grids of one name, voxels below 1e-12, or a grid that is to be written in 16 bits and
-/// has values beyond 65504 or, as a level set, voxels below 3e-5.
+/// has values beyond 65504 or, as a level set, none beyond 9e-5.
 void requireWritable(const std::vector<VdbGrid>& grids);
 
 /// Writes grids to `path`, beside it first and then renamed. `metadata` (command line, seed, version ...)

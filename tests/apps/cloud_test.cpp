@@ -253,6 +253,16 @@ TEST(CloudVerb, WithoutAmplitudeIsTheMesh) {
   EXPECT_EQ(double(stats["layers"][0]["mean_displacement"]), 0);
 }
 
+TEST(CloudVerb, RefusesLayersThatReachFartherThanVoxelsAreNumbered) {
+  const TemporaryFolder folder;
+  for (const char* amplitude : {"1e10", "1e30"}) {
+    const ProgramResult result = runProgram("cloud " + kSphere + " -o " + folder.file("out.vdb") +
+                                            " --resolution 16 --layers 1 --amplitude " + amplitude);
+    EXPECT_EQ(result.exitCode, 1);
+    EXPECT_NE(result.errors.find("can be numbered"), std::string::npos) << result.errors;
+  }
+}
+
 TEST(CloudVerb, SavesHalfFloatsOnRequest) {
   const TemporaryFolder folder;
   const ProgramResult result =

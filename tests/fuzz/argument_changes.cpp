@@ -191,7 +191,7 @@ class ArgumentChanges : Choices {
   std::string valueOf(std::string form) {
     if (below(12) == 0) return below(2) == 0 ? field() : number();
     form = form.substr(form.starts_with("TEXT:{") || form.starts_with("LIST:{") ? 6 : 0);
-    std::string text, word_;
+    std::string text, name;
     std::vector<std::string> alternatives{""};
     int depth = 0;
     for (const char c : form) {
@@ -205,12 +205,12 @@ class ArgumentChanges : Choices {
     const std::string chosen = any(alternatives);
     bool isLeftOut = false;
     const auto flush = [&] {
-      if (!word_.empty() && !isLeftOut) text += std::isupper(std::uint8_t(word_[0])) ? word(word_) : word_;
-      word_.clear();
+      if (!name.empty() && !isLeftOut) text += std::isupper(std::uint8_t(name[0])) ? word(name) : name;
+      name.clear();
     };
     for (const char c : chosen) {
       if (std::isalnum(std::uint8_t(c)) || c == '-' || c == '_') {
-        word_ += c;
+        name += c;
         continue;
       }
       flush();

@@ -1,9 +1,14 @@
 #include "nephele/levelset/cloud/detail/layer_parts.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
+
+#include "nephele/modeling/base/error.h"
 
 namespace nephele::detail {
 namespace {
@@ -13,6 +18,19 @@ namespace {
 constexpr int kPartBricks = 4;
 constexpr double kPartPositions = 1 << 15;
 
+/// The bricks that a box needs. @throws Error where their voxels could not be numbered.
+BrickSlab bricksAlong(const Box& box, int axis, float voxelSize) {
+  constexpr float kFarthest = 1 << 27;
+  const float brick = voxelSize * BrickGrid::kBrick;
+  const float first = std::floor(box.min[axis] / brick), last = std::floor(box.max[axis] / brick);
+  if (!(first >= -kFarthest && last <= kFarthest))
+    throw Error(
+        fmt::format("layers: they would reach {:.3g} voxels from the origin, and {:.3g} can be numbered; use "
+                    "larger voxels (a lower --resolution or a larger --voxel-size) or a lower --amplitude",
+                    std::max(-first, last) * BrickGrid::kBrick, kFarthest * BrickGrid::kBrick));
+  return {int(first) - 1, int(last) + 2};
+}
+
 }  // namespace
 
 BrickSamples noSamples(const Box& box, float voxelSize, const BrickSlab& slab) {
@@ -20,9 +38,9 @@ BrickSamples noSamples(const Box& box, float voxelSize, const BrickSlab& slab) {
   samples.voxelSize = voxelSize;
   BrickBox places;
   for (int axis = 0; axis < 3; ++axis) {
-    places.first[axis] = int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1;
-    places.count[axis] =
-        int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2 - places.first[axis];
+    const BrickSlab bricks = bricksAlong(box, axis, voxelSize);
+    places.first[axis] = bricks.begin;
+    places.count[axis] = bricks.end - bricks.begin;
   }
   places.first.z = slab.begin;
   places.count.z = slab.end - slab.begin;
@@ -35,10 +53,7 @@ BrickSamples noSamples(const Box& box, float voxelSize, const BrickSlab& slab) {
 }
 
 LayerParts partsOf(const Box& box, float voxelSize, int reach) {
-  const auto bricks = [&](int axis) {
-    return BrickSlab{int(std::floor(box.min[axis] / voxelSize / BrickGrid::kBrick)) - 1,
-                     int(std::floor(box.max[axis] / voxelSize / BrickGrid::kBrick)) + 2};
-  };
+  const auto bricks = [&](int axis) { return bricksAlong(box, axis, voxelSize); };
   const auto size = [&](int axis) { return bricks(axis).end - bricks(axis).begin; };
   const double across = double(size(0)) * size(1);
   LayerParts parts{bricks(2), size(2), 1 + (reach + 1 + BrickGrid::kAfter) / BrickGrid::kBrick};
