@@ -117,7 +117,9 @@ Outcome run(const std::string& verb, const std::vector<std::string>& arguments) 
     lastError() = printable(message);
     checkMessage(lastError(), "");
     const bool isNamed = std::ranges::any_of(arguments, [](const std::string& argument) {
-      return !argument.empty() && lastError().find(printable(argument)) != std::string::npos;
+      // Of NAME=FILE the file.
+      const std::string name = argument.substr(argument.find('=') + 1);
+      return lastError().find(name.empty() ? "''" : printable(name)) != std::string::npos;
     });
     const bool isInput = lastError().starts_with("input: ") || lastError().starts_with("files: ");
     expect(isNamed || isInput || lastError().find("--") != std::string::npos,
