@@ -95,6 +95,11 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, c
   });
   DotVolumeOptions& d = result.dots;
   d.voxelSize = float(voxelSize.value > 0 ? voxelSize.worldUnits(side) : side / resolution);
+  // An input is named by itself.
+  if (input.empty() && !(d.voxelSize >= DotVolume::kLeastVoxel && d.voxelSize <= DotVolume::kLargestVoxel))
+    throw CLI::ValidationError("--voxel-size",
+                               fmt::format("voxels of {:g} are not from {:g} to {:g}", d.voxelSize,
+                                           DotVolume::kLeastVoxel, DotVolume::kLargestVoxel));
   // A smear is soft as it is, and large dots make it dear.
   const bool smears = shutterOpen != 0 || shutterClose != 0;
   d.radius = dotRadiusOption->count() > 0 ? float(dotRadius.worldUnits(side))

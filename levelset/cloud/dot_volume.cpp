@@ -38,11 +38,9 @@ constexpr std::size_t kVoxels = kBrickSamples;
 }  // namespace
 
 DotVolume::DotVolume(const DotVolumeOptions& o) : impl_(std::make_unique<Impl>(o)) {
-  // Masses are divided by cubes of these, in single precision.
-  constexpr float kLeastVoxel = 1e-12f, kLargestVoxel = 1e12f;
   require(o.voxelSize >= kLeastVoxel && o.voxelSize <= kLargestVoxel,
           fmt::format("dots: voxels may be from {:g} to {:g} wide, got {:g}; scale what they are made from, "
-                      "or give another --voxel-size",
+                      "or give another size of voxels",
                       kLeastVoxel, kLargestVoxel, o.voxelSize));
   require(o.radius >= 0 && o.radius <= kLargestRadius * o.voxelSize,
           fmt::format("dots: radius must be from 0 to {:g} ({:g} voxels), got {:g}",

@@ -10,7 +10,7 @@
 namespace nephele {
 
 struct DotVolumeOptions {
-  /// Edge of a voxel, world units, from 1e-12 to 1e12. Voxel centres lie at integer multiples of it.
+  /// Edge of a voxel, world units, see DotVolume::kLeastVoxel. Voxel centres lie at integer multiples of it.
   float voxelSize = 0.0f;
   /// Radius of dots that bring none of their own, world units, >= 0.
   float radius = 0.0f;
@@ -38,6 +38,8 @@ class DotVolume {
  public:
   /// Largest radius of a dot and largest length of a smear, voxels.
   static constexpr float kLargestRadius = 64.0f;
+  /// Edges of voxels, world units: masses are divided by cubes of these, in single precision.
+  static constexpr float kLeastVoxel = 1e-12f, kLargestVoxel = 1e12f;
   static constexpr float kLongestSmear = 16384.0f;
 
   /// @throws Error for options outside their range.

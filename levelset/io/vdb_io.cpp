@@ -164,12 +164,12 @@ void requireHalfHolds(const VdbGrid& grid) {
   if (most > kMost)
     throw Error(
         fmt::format("the grid '{}' has values up to {:.6g}, and 16 bit floats end at {:g}; write 32 bit "
-                    "floats, without --half",
+                    "floats",
                     printable(info.name), most, kMost));
   if (info.gridClass == VdbGridInfo::Class::levelSet && most > 0 && most < kLeastBand)
     throw Error(fmt::format(
         "the grid '{}' has distances up to {:.3g}, and 16 bit floats are {:g} apart; write 32 bit "
-        "floats, without --half",
+        "floats",
         printable(info.name), most, kApart));
 }
 
