@@ -58,9 +58,8 @@ void growCloud(const CloudArguments& arguments, Run& run) {
   FieldSources sources = arguments.sources(shape, run);
   const CloudOptions options = arguments.resolved(sources, run);
   tellLayers(arguments, options, sources.box(), run);
-  run.requireMemory(namingFile("--resolution, --voxel-size, --amplitude",
-                               [&] { return estimatedCloudBytes(shape, options); }),
-                    "use larger voxels (a lower --resolution or a larger --voxel-size)");
+  const double bytes = namingFile("--amplitude", [&] { return estimatedCloudBytes(shape, options); });
+  run.requireMemory(bytes, "use larger voxels (a lower --resolution or a larger --voxel-size)");
   // Distance, layers, density and perhaps the surface.
   run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
   Cloud cloud = namingFile(arguments.shape.name(),
