@@ -34,7 +34,8 @@ VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, FieldSources& s
   velocity.octaves = 4;
   velocity.roughness = 0.6;
   velocity.seed = seed;
-  const AdvectionOptions options{.method = AdvectionMethod::gridless, .steps = steps};
+  const AdvectionOptions options{
+      .method = AdvectionMethod::gridless, .steps = steps, .mostBytes = run.memoryLimitBytes};
   const CarriedGrids grids = carriedGrids({density});
   if (grids.box.isEmpty()) return density;
   run.requireMemory(estimatedAdvectionBytes(grids.bricks, options),

@@ -33,6 +33,7 @@ Extent extentOfCarried(const AdvectArguments& arguments, Run&) {
 
 void carry(const AdvectArguments& arguments, Run& run) {
   AdvectionOptions options = arguments.resolved();
+  options.mostBytes = run.memoryLimitBytes;
   run.begin("read");
   run.expect(0, 0.05);
   const CarriedGrids input =

@@ -20,6 +20,7 @@
 #include <cmath>
 
 #include "nephele/levelset/flow/detail/flow_seeds.h"
+#include "nephele/levelset/flow/detail/kept_bricks.h"
 #include "nephele/levelset/grid/brick_growth.h"
 #include "nephele/modeling/base/error.h"
 
@@ -94,10 +95,7 @@ std::vector<Vec3i> overlapping(const std::vector<Vec3i>& bricks, const Lattice& 
       const Vec3i voxel = (brick + Vec3i{corner & 1, corner >> 1 & 1, corner >> 2}) * BrickGrid::kBrick;
       box = box.including(to.worldToIndex(from.indexToWorld(Vec3f(voxel))));
     }
-    const auto at = [](const Vec3f& q) {
-      return brickOf(Vec3i{int(std::floor(q.x)), int(std::floor(q.y)), int(std::floor(q.z))});
-    };
-    const Vec3i low = at(box.min), high = at(box.max);
+    const Vec3i low = brickAround(box.min), high = brickAround(box.max);
     for (int z = low.z; z <= high.z; ++z)
       for (int y = low.y; y <= high.y; ++y)
         for (int x = low.x; x <= high.x; ++x) result.push_back({x, y, z});
@@ -115,7 +113,8 @@ GridHandle assembled(const detail::GrownBricks& grown, const BrickGrid& like) {
 
 /// `grid` read at map(x), on bricks from `seeds` on.
 GridHandle readThrough(const GridHandle& grid, const std::vector<Vec3i>& seeds, const VectorField& map,
-                       const std::function<bool(const Vec3f&)>& isMapped, const Progress& progress) {
+                       const std::function<bool(const Vec3f&)>& isMapped, const Progress& progress,
+                       double mostBytes) {
   const Source source(grid, Interpolation::tricubic);
   const Lattice lattice = grid->lattice();
   const auto fill = [&](const Vec3i& brick, float* samples) {
@@ -127,7 +126,13 @@ GridHandle readThrough(const GridHandle& grid, const std::vector<Vec3i>& seeds, 
       if (!isMapped(points[i])) samples[i] = grid->background();
     return holdsOther(samples, grid->background());
   };
-  return assembled(detail::growBricks(seeds, {}, fill, progress), *grid);
+  return assembled(detail::growBricks(seeds, {.mostBytes = mostBytes}, fill, progress), *grid);
+}
+
+/// What is left beside all grids.
+double bytesLeft(const std::vector<GridHandle>& grids, double mostBytes) {
+  for (const GridHandle& grid : grids) mostBytes -= double(grid->memoryBytes());
+  return mostBytes;
 }
 
 /// The bricks in which one grid holds anything.
@@ -144,8 +149,9 @@ std::vector<Vec3i> arrivals(const GridHandle& grid, const VectorField& forward, 
 /// One step of a gridded scheme.
 class GridStep {
  public:
-  GridStep(GridHandle grid, const VectorField& velocity, float dt)
-      : source_(std::move(grid), Interpolation::trilinear),
+  GridStep(GridHandle grid, const VectorField& velocity, float dt, double mostBytes)
+      : growth_{.mostBytes = mostBytes},
+        source_(std::move(grid), Interpolation::trilinear),
         lattice_(source_.grid->lattice()),
         back_(traceBack(velocity, {.dt = dt})),
         forward_(traceBack(velocity, {.dt = -dt})) {
@@ -178,7 +184,7 @@ class GridStep {
       }
       return holdsOther(samples, source_.grid->background());
     };
-    return assembled(detail::growBricks(seeds(), {}, fill, second), *source_.grid);
+    return assembled(detail::growBricks(seeds(), growth_, fill, second), *source_.grid);
   }
 
   GridHandle bfecc(const Progress& progress) const {
@@ -196,7 +202,7 @@ class GridStep {
       return holdsOther(samples, source_.grid->background());
     };
     const Source corrected(
-        assembled(detail::growBricks(ownBricks(source_.grid), {}, fill, second), *source_.grid),
+        assembled(detail::growBricks(ownBricks(source_.grid), growth_, fill, second), *source_.grid),
         Interpolation::trilinear);
     return moved(corrected, source_, third);
   }
@@ -218,9 +224,10 @@ class GridStep {
         samples[i] = cleared(withinCell(*limits.grid, before[i], samples[i]));
       return holdsOther(samples, source_.grid->background());
     };
-    return assembled(detail::growBricks(seeds(), {}, fill, progress), *source_.grid);
+    return assembled(detail::growBricks(seeds(), growth_, fill, progress), *source_.grid);
   }
 
+  detail::GrowthOptions growth_;
   Source source_;
   Lattice lattice_;
   VectorField back_, forward_;
@@ -251,13 +258,16 @@ void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const 
       options.startMap && !options.startMap->isIdentity() ? *options.startMap : identityMap(*matter);
   const auto bake = [&](const Progress& part) {
     if (map.isIdentity()) return;
-    for (GridHandle& grid : result.grids) grid = throughMap(grid, map, *matter, part);
+    for (GridHandle& grid : result.grids)
+      grid = throughMap(grid, map, *matter, part,
+                        bytesLeft(result.grids, options.mostBytes) - double(map.memoryBytes()));
   };
   for (int step = 0; step < options.steps; ++step) {
     const auto start = std::chrono::steady_clock::now();
     const SubProgress part(progress, double(step) / (options.steps + 1),
                            double(step + 1) / (options.steps + 1));
-    map = advanced(map, *matter, velocity(step), options.dt, part);
+    map =
+        advanced(map, *matter, velocity(step), options.dt, part, bytesLeft(result.grids, options.mostBytes));
     progress.check();
     AdvectionStep report{.bricks = map.bricks.size(), .memoryBytes = map.memoryBytes()};
     report.foldedShare = foldedShare(map, *matter);
@@ -295,7 +305,7 @@ void advectGridless(AdvectedGrids& result, const VelocityOfStep& velocity, const
     }
     result.grids[i] = readThrough(
         result.grids[i], arrivals(result.grids[i], forward, longest), map, [](const Vec3f&) { return true; },
-        part);
+        part, bytesLeft(result.grids, options.mostBytes));
   }
 }
 
@@ -309,7 +319,7 @@ void advectOnGrids(AdvectedGrids& result, const VelocityOfStep& velocity, const 
     AdvectionStep report;
     for (GridHandle& grid : result.grids) {
       const SubProgress part(progress, done / parts, (done + 1) / parts);
-      const GridStep one(grid, u, options.dt);
+      const GridStep one(grid, u, options.dt, bytesLeft(result.grids, options.mostBytes));
       grid = options.scheme == GridScheme::plain        ? one.plain(part)
              : options.scheme == GridScheme::macCormack ? one.macCormack(part)
                                                         : one.bfecc(part);
@@ -338,14 +348,12 @@ void requireSane(const std::vector<GridHandle>& grids, const AdvectionOptions& o
 }  // namespace
 
 GridHandle throughMap(const GridHandle& grid, const FlowMap& map, const Matter& matter,
-                      const Progress& progress) {
+                      const Progress& progress, double mostBytes) {
   if (map.isIdentity()) return grid;
-  detail::BrickTable kept("advection");
-  for (const Vec3i& brick : map.bricks) kept.set(brick, 0);
+  const detail::KeptBricks kept(map);
   const std::vector<Vec3i> seeds = overlapping(matterBricks(map, matter), map.lattice, grid->lattice());
   return readThrough(
-      grid, seeds, mapField(map), [&](const Vec3f& p) { return kept.at(brickAt(map.lattice, p)) >= 0; },
-      progress);
+      grid, seeds, mapField(map), [&](const Vec3f& p) { return kept.hold(p); }, progress, mostBytes);
 }
 
 AdvectedGrids advectGrids(std::vector<GridHandle> grids, const VelocityOfStep& velocity,

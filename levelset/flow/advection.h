@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -45,6 +46,8 @@ struct AdvectionOptions {
   /// selma: bake the grids and start a new map as soon as more than this share of the map has folded; 0 to 1.
   /// Not given: never.
   std::optional<double> rebakeShare = 0.05;
+  /// Memory that grids and maps may take. How far matter spreads is seen on the way only.
+  double mostBytes = std::numeric_limits<double>::infinity();
   /// selma: the map to go on from; the grids are those that it started with.
   std::optional<FlowMap> startMap{};
 };
@@ -74,11 +77,11 @@ struct AdvectedGrids {
 /// Catmull-Rom within the eight samples around) and never leave what a grid held; level sets keep their zero
 /// surface but are no distances afterwards. Vectors are carried component by component, without being turned.
 /// All cores; the same bits at any thread count.
-/// @throws Error if no grid holds anything, an option is outside its range, or the velocity is not finite or
-/// moves matter by more than kLongestStep voxels in a step; Cancelled.
-/// Source: Tessendorf, Resolution Independent Volumes, chapters 7 and 8; A. Selle and others, An
-/// Unconditionally Stable MacCormack Method (2008); T. Dupont and Y. Liu, Back and Forth Error Compensation
-/// and Correction Methods (2003).
+/// @throws Error if no grid holds anything, an option is outside its range, the velocity is not finite or
+/// moves matter by more than kLongestStep voxels in a step, or matter spreads over more than `mostBytes`
+/// hold; Cancelled. Source: Tessendorf, Resolution Independent Volumes, chapters 7 and 8; A. Selle and
+/// others, An Unconditionally Stable MacCormack Method (2008); T. Dupont and Y. Liu, Back and Forth Error
+/// Compensation and Correction Methods (2003).
 AdvectedGrids advectGrids(std::vector<std::shared_ptr<const BrickGrid>> grids, const VelocityOfStep& velocity,
                           const AdvectionOptions& options, const Progress& progress = silent());
 /// The same with a velocity that stays.
@@ -86,8 +89,10 @@ AdvectedGrids advectGrids(std::vector<std::shared_ptr<const BrickGrid>> grids, c
                           const AdvectionOptions& options, const Progress& progress = silent());
 
 /// `grid` read through `map`, on its own voxels: what advectGrids does last with selma.
+/// @throws Error if the result takes more than `mostBytes`; Cancelled.
 std::shared_ptr<const BrickGrid> throughMap(const std::shared_ptr<const BrickGrid>& grid, const FlowMap& map,
-                                            const Matter& matter, const Progress& progress = silent());
+                                            const Matter& matter, const Progress& progress = silent(),
+                                            double mostBytes = std::numeric_limits<double>::infinity());
 
 /// Memory that `advectGrids` needs, bytes, if matter spreads to about twice the bricks that it fills now.
 /// @throws Error if no grid holds anything, as advectGrids does.

@@ -7,7 +7,7 @@
 // step is where the flow takes 27 points of each such brick; from there the set grows over neighbours until
 // it is closed. The test uses X itself, not the bricks of the step before, so the set does not swell from
 // step to step. The neighbours around it give the interpolation what it reads; farther out the nearest kept
-// sample is repeated.
+// sample is repeated, and nothing of it counts as matter: what comes from there was none before.
 //
 // Limits: matter thinner than a voxel may fall between the voxels, there as in the picture.
 #include "nephele/levelset/flow/flow_map.h"
@@ -15,10 +15,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <climits>
 #include <cmath>
 
 #include "nephele/levelset/flow/detail/flow_seeds.h"
+#include "nephele/levelset/flow/detail/kept_bricks.h"
 #include "nephele/levelset/grid/brick_growth.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -57,54 +60,6 @@ bool ownBox(const BrickGrid& grid, std::int32_t pool, Vec3i& first, Vec3i& last)
   return last.x >= 0;
 }
 
-/// The brick around index coordinates.
-Vec3i cornerBrick(const Vec3f& q) {
-  return {brickOf(int(std::floor(q.x))), brickOf(int(std::floor(q.y))), brickOf(int(std::floor(q.z)))};
-}
-
-/// The bricks of a map as a table, and the way to the nearest of them.
-class KeptBricks {
- public:
-  explicit KeptBricks(const FlowMap& map) : lattice_(map.lattice) {
-    for (std::size_t i = 0; i < map.bricks.size(); ++i) table_.set(map.bricks[i], std::int32_t(i));
-  }
-
-  bool hold(const Vec3f& world) const { return table_.at(brickAt(lattice_, world)) >= 0; }
-
-  /// The point itself, or the nearest one in a kept brick up to two bricks away; false if there is none.
-  bool nearest(Vec3f& world) const {
-    const Vec3i brick = brickAt(lattice_, world);
-    if (table_.at(brick) >= 0) return true;
-    const Vec3f q = lattice_.worldToIndex(world);
-    float best = INFINITY;
-    Vec3f found;
-    for (int z = -kSearch; z <= kSearch; ++z)
-      for (int y = -kSearch; y <= kSearch; ++y)
-        for (int x = -kSearch; x <= kSearch; ++x) {
-          const Vec3i other = brick + Vec3i{x, y, z};
-          if (table_.at(other) < 0) continue;
-          const Vec3f low(other * BrickGrid::kBrick);
-          const Vec3f clamped = min(max(q, low), low + Vec3f{kLast, kLast, kLast});
-          const Vec3f away = q - clamped;
-          if (const float distance = dot(away, away); distance < best) {
-            best = distance;
-            found = clamped;
-          }
-        }
-    if (best == INFINITY) return false;
-    world = lattice_.indexToWorld(found);
-    return true;
-  }
-
- private:
-  static constexpr int kSearch = 2;
-  /// Just inside the cells of a brick.
-  static constexpr float kLast = BrickGrid::kBrick - 1e-3f;
-
-  Lattice lattice_;
-  BrickTable table_{"advection"};
-};
-
 [[noreturn]] void failNotFinite(const Vec3f& p) {
   throw Error(fmt::format("advection: the velocity at {:g},{:g},{:g} is not finite", p.x, p.y, p.z));
 }
@@ -113,6 +68,34 @@ Spans<3> spansOf(BrickPoints& points) {
   Spans<3> spans;
   spans.lanes = {std::span<float>(points.x), std::span<float>(points.y), std::span<float>(points.z)};
   return spans;
+}
+
+/// Gives samples that are not known what the nearest known one of the brick has; false if none is known.
+bool repeatKnown(const std::array<bool, kBrickSamples>& isKnown, BrickPoints& values) {
+  constexpr int kEdge = BrickGrid::kBrick;
+  const auto placeOf = [](int i) { return Vec3i{i % kEdge, i / kEdge % kEdge, i / (kEdge * kEdge)}; };
+  for (int i = 0; i < kBrickSamples; ++i) {
+    if (isKnown[std::size_t(i)]) continue;
+    int best = INT_MAX, found = -1;
+    for (int k = 0; k < kBrickSamples; ++k) {
+      if (!isKnown[std::size_t(k)]) continue;
+      const Vec3i way = placeOf(k) - placeOf(i);
+      if (const int distance = way.x * way.x + way.y * way.y + way.z * way.z; distance < best)
+        best = distance, found = k;
+    }
+    if (found < 0) return false;
+    values.set(i, values[found]);
+  }
+  return true;
+}
+
+/// Takes out the bricks whose first sample is no number.
+void dropUnknown(detail::GrownBricks& grown) {
+  std::erase_if(grown.bricks, [&](const Vec3i& brick) {
+    if (!std::isnan(*grown.samples.find(brick))) return false;
+    grown.samples.table().set(brick, BrickTable::kNone);
+    return true;
+  });
 }
 
 }  // namespace
@@ -141,7 +124,7 @@ Matter::Matter(std::span<const std::shared_ptr<const BrickGrid>> grids, const La
                               corner & 4 ? high.z : low.z};
             box = box.including(lattice.worldToIndex(grid->indexToWorld()(Vec3f(voxel))));
           }
-          const Vec3i low = cornerBrick(box.min), high = cornerBrick(box.max);
+          const Vec3i low = brickAround(box.min), high = brickAround(box.max);
           for (int k = low.z; k <= high.z; ++k)
             for (int j = low.y; j <= high.y; ++j)
               for (int i = low.x; i <= high.x; ++i)
@@ -202,7 +185,7 @@ std::vector<Vec3i> matterBricks(const FlowMap& map, const Matter& matter) {
 }
 
 FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& velocity, float dt,
-                 const Progress& progress) {
+                 const Progress& progress, double mostBytes) {
   require(std::isfinite(dt), "advection: dt must be finite");
   const Lattice& lattice = map.lattice;
   const VectorField back = traceBack(velocity, {.dt = dt});
@@ -212,7 +195,7 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
   progress.check();
   const std::vector<Vec3i> seeds =
       detail::flowSeeds(before, lattice, lattice, traceBack(velocity, {.dt = -dt}), kLongestStep);
-  const KeptBricks kept(map);
+  const detail::KeptBricks kept(map);
   const VectorField displacement =
       map.isIdentity() ? VectorField(Vec3f{}) : gridField(map.displacement, Interpolation::tricubic);
 
@@ -221,25 +204,31 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
     BrickPoints source, moved;
     back.eval({points.x, points.y, points.z}, spansOf(source));
     BrickPoints read = source;
-    bool isKnown = map.isIdentity();
-    if (!isKnown)
-      for (int i = 0; i < kBrickSamples; ++i) {
-        Vec3f p = source[i];
-        isKnown |= kept.nearest(p);
-        read.set(i, p);
-      }
+    std::array<bool, kBrickSamples> isInside, isKnown;
+    for (int i = 0; i < kBrickSamples; ++i) {
+      Vec3f p = source[i];
+      isInside[std::size_t(i)] = map.isIdentity() || kept.hold(p);
+      isKnown[std::size_t(i)] = isInside[std::size_t(i)] || kept.moveInside(p);
+      read.set(i, p);
+    }
     displacement.eval({read.x, read.y, read.z}, spansOf(moved));
+    if (!repeatKnown(isKnown, moved)) {
+      *samples = NAN;
+      return false;
+    }
     bool matters = false;
     for (int i = 0; i < kBrickSamples; ++i) {
       const Vec3f d = (source[i] - points[i]) + moved[i];
       if (!isFinite(d)) failNotFinite(points[i]);
       for (int c = 0; c < 3; ++c) samples[c * kBrickSamples + i] = d[c];
-      matters = matters || (isKnown && matter.mayBeAt(points[i] + d));
+      matters = matters || (isInside[std::size_t(i)] && matter.mayBeAt(points[i] + d));
     }
     return matters;
   };
-  const detail::GrownBricks grown =
-      detail::growBricks(seeds, {.components = 3, .withNeighbours = true}, evaluate, progress);
+  detail::GrownBricks grown = detail::growBricks(
+      seeds, {.components = 3, .withNeighbours = true, .mostBytes = mostBytes - double(map.memoryBytes())},
+      evaluate, progress);
+  dropUnknown(grown);
   progress.check();
   const float zero[3] = {};
   const auto grids = detail::assembleGrids(grown, lattice, zero, detail::Beyond::nearest);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -62,10 +63,11 @@ FlowMap identityMap(const Matter& matter);
 /// read. Kept are the bricks that hold a voxel whose X lies in `matter`, and their neighbours: what an
 /// earlier call kept is all that the next one needs, so a map may be written and continued later. Time and
 /// memory follow the bricks kept, not the steps before. All cores; the same bits at any thread count.
-/// @throws Error if dt is not finite, the velocity is not, or it carries a voxel farther than kLongestStep
-/// voxels; Cancelled.
+/// @throws Error if dt is not finite, the velocity is not, it carries a voxel farther than kLongestStep
+/// voxels, or the map and the one before it take more than `mostBytes`; Cancelled.
 FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& velocity, float dt,
-                 const Progress& progress = silent());
+                 const Progress& progress = silent(),
+                 double mostBytes = std::numeric_limits<double>::infinity());
 
 /// Voxels that one step may move matter by.
 inline constexpr float kLongestStep = 256.0f;

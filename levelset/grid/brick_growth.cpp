@@ -4,6 +4,8 @@
 // its image find all of it.
 #include "nephele/levelset/grid/brick_growth.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -58,8 +60,14 @@ GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& opt
   // Of each number, the brick and whether it matters; the last ones are yet to be evaluated.
   std::vector<Vec3i> asked;
   std::vector<std::uint8_t> matters;
+  const double perBrick = double(options.components) * (kBrickSamples + BrickGrid::kVolume) * sizeof(float);
   const auto ask = [&](const Vec3i& brick) {
     if (numbers.at(brick) >= 0) return;
+    if (double(asked.size()) * perBrick > options.mostBytes)
+      throw Error(fmt::format(
+          "advection: matter spreads over more bricks than the memory limit leaves room for ({:.0f} MB); "
+          "larger voxels, a coarser map or a smaller velocity need less",
+          std::max(options.mostBytes, 0.0) / 1e6));
     grown.samples.add(brick);
     asked.push_back(brick);
   };

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -41,6 +42,8 @@ struct GrowthOptions {
   int components = 1;
   /// Keep the 26 neighbours of the bricks that matter, too.
   bool withNeighbours = false;
+  /// Memory that the samples and the grids made of them may take.
+  double mostBytes = std::numeric_limits<double>::infinity();
 };
 
 /// Fills the samples of a brick and says whether the brick matters. Called from several threads.
@@ -48,6 +51,7 @@ using EvaluateBrick = std::function<bool(const Vec3i& brick, float* samples)>;
 
 /// Evaluates `seeds`, then the neighbours of bricks that matter, until none that matters is left outside: all
 /// of a connected region is found from any brick in it. The result does not depend on the threads.
+/// @throws Error if that takes more than `mostBytes`; Cancelled.
 GrownBricks growBricks(const std::vector<Vec3i>& seeds, const GrowthOptions& options,
                        const EvaluateBrick& evaluate, const Progress& progress);
 

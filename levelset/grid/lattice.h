@@ -24,12 +24,16 @@ struct Lattice {
   }
 };
 
-/// The brick of the lattice that `point` (world) lies in; far away where the point is not finite.
-inline Vec3i brickAt(const Lattice& lattice, const Vec3f& point) {
+/// The brick around index coordinates; far away where they are not finite.
+inline Vec3i brickAround(const Vec3f& q) {
   constexpr float kFar = 1e9f;
-  const Vec3f q = lattice.worldToIndex(point);
   const auto along = [](float x) { return brickOf(x > -kFar && x < kFar ? int(std::floor(x)) : int(kFar)); };
   return {along(q.x), along(q.y), along(q.z)};
+}
+
+/// The brick of the lattice that `point` (world) lies in; far away where the point is not finite.
+inline Vec3i brickAt(const Lattice& lattice, const Vec3f& point) {
+  return brickAround(lattice.worldToIndex(point));
 }
 
 /// The lattice with voxels `factor` times as wide, > 0; voxel (0, 0, 0) stays.

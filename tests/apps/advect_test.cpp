@@ -167,6 +167,17 @@ TEST_F(AdvectVerb, RefusesFilesThatDoNotFit) {
   EXPECT_EQ(folder_.entryCount(), 1u);  // the cloud itself
 }
 
+TEST_F(AdvectVerb, EndsWhereMatterSpreadsBeyondTheMemoryLimit) {
+  const ProgramResult result =
+      advect("out.vdb", "--velocity noise:amplitude=30%,frequency=1x --steps 6 --memory-limit 24M");
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(
+      result.errors.find(cloud() + ": advection: matter spreads over more bricks than the memory limit"),
+      std::string::npos)
+      << result.errors;
+  EXPECT_EQ(folder_.entryCount(), 1u);  // the cloud itself
+}
+
 // Percent are of the longest side of what is carried, for each component by itself.
 TEST_F(AdvectVerb, TakesVectorsInPercent) {
   const Box box = carriedGrids(readVdbFile(cloud())).box;

@@ -13,6 +13,7 @@
 
 #include "apps/detail/program_run.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/point_io.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/felt/diagnostic.h"
@@ -151,17 +152,16 @@ Outcome run(const std::string& verb, const std::vector<std::string>& arguments) 
 }
 
 /// What a verb wrote can be read, and is made of numbers.
-void checkOutput(const std::string& name, const fs::path& path) {
-  // Statistics may have any name; points have no faces.
+void checkOutput(const std::string& verb, const std::string& name, const fs::path& path) {
+  // Statistics may have any name.
   const std::string contents = contentsOf(path);
   if (contents.starts_with('{')) return;
-  if (contents.starts_with("ply") && contents.find("element face") == contents.npos) return;
   const std::string extension = path.extension().string();
   if (extension == ".vdb") {
     for (const VdbGrid& grid : readVdbFile(path.string()))
       expect(valueRange(grid).notFinite == 0, name + " has values that are no numbers");
   } else if (extension == ".obj" || extension == ".ply" || extension == ".stl") {
-    const Mesh mesh = readMesh(path.string());
+    const Mesh mesh = verb == "wisps" ? readPoints(path.string()) : readMesh(path.string());
     for (const MeshAttribute& attribute : mesh.attributes)
       for (const float value : attribute.values)
         if (!std::isfinite(value)) fail(name + " has attributes that are no numbers");
@@ -248,7 +248,7 @@ bool useVerb(const Input& input) {
                                           outputs.empty() ? "" : outputs.begin()->first, lastError()));
     return false;
   }
-  for (const auto& [name, path] : outputs) checkOutput(name, path);
+  for (const auto& [name, path] : outputs) checkOutput(verb, name, path);
 
   if (input.hash % 8 != 0 || has(given, "--stats") || has(given, "--cache")) return true;
   std::map<std::string, std::string> before;

@@ -43,8 +43,7 @@ std::vector<Vec3i> flowSeeds(const std::vector<Vec3i>& bricks, const Lattice& fr
             "{:g}; use a smaller velocity or dt, and more steps",
             p.x, p.y, p.z, distance, longest));
       }
-      arrived[begin * kPoints + i] =
-          brickOf(Vec3i{int(std::floor(q.x)), int(std::floor(q.y)), int(std::floor(q.z))});
+      arrived[begin * kPoints + i] = brickAround(q);
     }
   });
   std::sort(arrived.begin(), arrived.end(), comesBefore);

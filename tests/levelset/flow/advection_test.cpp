@@ -82,6 +82,27 @@ TEST(Advection, ShiftsGridsByWholeVoxelsExactly) {
   }
 }
 
+TEST(Advection, ASteadyWindIsTheSameEverywhereInTheMap) {
+  // X = x - u t, in any voxels: their faces are no numbers that a float holds, and u along them is zero.
+  constexpr float kVoxel = 0.0195906f;
+  const Vec3f u = Vec3f{5.1f, 1.6f, 0} * kVoxel;
+  constexpr int kSteps = 12;
+  const Grid ball = softBallGrid(12 * kVoxel, voxels(kVoxel), Vec3f{3, 5, -2} * kVoxel);
+  const AdvectedGrids moved = advectGrids({ball}, VectorField(u), {.steps = kSteps, .rebakeShare = {}});
+  double worst = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    forVoxels(*moved.map->displacement[std::size_t(axis)], [&](const Vec3i&, float value) {
+      worst = std::max(worst, double(std::abs(value + float(kSteps) * u[axis])) / kVoxel);
+    });
+  EXPECT_LT(worst, 1e-3);
+  const std::size_t first = moved.steps.front().bricks;
+  for (const AdvectionStep& step : moved.steps) {
+    EXPECT_EQ(step.foldedShare, 0);
+    EXPECT_NEAR(double(step.bricks) / double(first), 1, 0.35);
+  }
+  EXPECT_NEAR(mass(*moved.grids[0]) / mass(*ball), 1, 1e-3);
+}
+
 TEST(Advection, WithoutStepsChangesNothing) {
   const Grid ball = softBallGrid(9);
   for (const Method method : kMethods) {
@@ -287,6 +308,26 @@ TEST(Advection, ReadsAMapOfLargerVoxelsNearlyAsWell) {
   const AdvectedGrids coarse = advectGrids({ball}, stirring(), {.steps = 10, .mapCoarseness = 2});
   EXPECT_NEAR(mass(*coarse.grids[0]) / mass(*fine), 1, 0.01);
   EXPECT_EQ(coarse.map->lattice.voxelSize, 2);
+}
+
+TEST(Advection, EndsWhereMatterSpreadsOverMoreThanItMayTake) {
+  // Each step makes it half as large again in every direction; the estimate allows for twice the bricks in
+  // all.
+  const VectorField bursting = position() * ScalarField(0.5f);
+  const Grid ball = softBallGrid(8);
+  for (const Method method : kMethods) {
+    AdvectionOptions options{.method = method, .steps = 4};
+    EXPECT_GT(advectGrids({ball}, bursting, options).grids[0]->poolSize(), 8 * ball->poolSize());
+    options.mostBytes = estimatedAdvectionBytes({ball}, options);
+    try {
+      advectGrids({ball}, bursting, options);
+      FAIL() << int(method);
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("memory limit"), std::string::npos) << error.what();
+    }
+    options.steps = 1;
+    EXPECT_NO_THROW(advectGrids({ball}, VectorField(Vec3f{0.5f, 1, 0}), options)) << int(method);
+  }
 }
 
 TEST(Advection, RefusesWhatCannotBe) {
