@@ -11,6 +11,7 @@
 
 #include "apps/looks.h"
 #include "apps/options/common_group.h"
+#include "apps/options/options.h"
 
 namespace nephele::apps {
 namespace {
@@ -67,9 +68,8 @@ void addCommonOptions(CLI::App& app, CommonOptions& options) {
   markOutput(app.add_option("--stats", options.stats, "Write statistics as one JSON object."))
       ->type_name("FILE")
       ->group(group);
-  app.add_option("--progress", options.progress, "auto, or alf for lines that farm software reads.")
-      ->check(CLI::IsMember({"auto", "alf"}))
-      ->capture_default_str()
+  addChoice<std::string>(app, "--progress", options.progress, {{"auto", "auto"}, {"alf", "alf"}},
+                         "auto, or alf for lines that farm software reads.")
       ->group(group);
   app.add_option("--memory-limit", options.memoryLimit,
                  "Refuse work that needs more: 8G, 512M or a share of memory.")
@@ -99,10 +99,16 @@ void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
     refuseValue(name, argument.substr(equals + 1), "no value; it is a flag");
 }
 
+void refuseRepeated(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    if (const std::size_t times = option->results().size();
+        times > std::size_t(option->get_items_expected_max()))
+      throw CLI::ValidationError(option->get_name(), fmt::format("is given {} times, allowed: once", times));
+}
+
 void refuseEmptyNames(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
-    const std::string type = option->get_type_name();
-    if (type.find("FILE") == std::string::npos && type.find("FOLDER") == std::string::npos) continue;
+    if (!isFileType(option->get_type_name())) continue;
     for (const std::string& value : option->results())
       if (value.empty()) refuseValue(option->get_name(false, true), value, "the name of a file");
   }
@@ -126,7 +132,12 @@ Command::Command(const Verb& of) : verb(of), app(of.summary, "nephele " + of.nam
 void Command::parse(std::vector<std::string> arguments) {
   for (const std::string& argument : arguments) refuseValueOfFlag(app, argument);
   std::reverse(arguments.begin(), arguments.end());
-  app.parse(std::move(arguments));
+  try {
+    app.parse(std::move(arguments));
+  } catch (const CLI::ArgumentMismatch&) {
+    refuseRepeated(app);
+    throw;
+  }
   refuseEmptyNames(app);
   if (verb.passesOthersOn) return;
   for (const std::string& extra : app.remaining()) {

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "apps/detail/command.h"
+#include "apps/options/options.h"
 #include "apps/options/outputs.h"
 
 namespace nephele::apps {
@@ -45,6 +46,10 @@ std::vector<std::string> OptionRow::choices() const {
     words.push_back(word);
   }
   return words.size() > 1 ? words : std::vector<std::string>{};
+}
+
+bool OptionRow::isFile() const {
+  return isOutput || isFileType(type);
 }
 
 std::vector<OptionRow> optionTable(const Verb& verb) {

@@ -28,7 +28,7 @@ struct OptionRow {
   /// The words that it takes, if these are all.
   std::vector<std::string> choices() const;
   /// Whether its value is the name of a file or folder.
-  bool isFile() const { return isOutput || type.find("FILE") != std::string::npos; }
+  bool isFile() const;
 };
 
 /// All options of `verb` but those that ask for help, in the order of --help-all.

@@ -29,10 +29,26 @@ std::optional<double> parseBytes(std::string_view text) {
   return value && *value > 0 && factor > 0 ? std::optional(*value * factor) : std::nullopt;
 }
 
+bool isFileType(std::string_view type) {
+  return type.find("FILE") != type.npos || type.find("FOLDER") != type.npos;
+}
+
+static std::string refusal(const std::string& text, const std::string& allowed) {
+  return fmt::format("got '{}', allowed: {}", text, allowed);
+}
+
 void refuseValue(const std::string& name, const std::string& text, const std::string& allowed) {
   const std::size_t comma = name.rfind(',');
   throw CLI::ValidationError(comma == std::string::npos ? name : name.substr(comma + 1),
-                             fmt::format("got '{}', allowed: {}", text, allowed));
+                             refusal(text, allowed));
+}
+
+CLI::Option* allowWords(CLI::Option* option, const std::vector<std::string>& words) {
+  return option->check([words](const std::string& text) {
+    return std::ranges::count(words, text) > 0
+               ? std::string()
+               : refusal(text, fmt::format("one of {}", fmt::join(words, "|")));
+  });
 }
 
 std::optional<Length> parseLength(std::string_view text) {
@@ -100,7 +116,7 @@ CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& tar
   return option;
 }
 
-namespace {
+namespace {}  // namespace
 
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
                        const std::function<void(double)>& set, const std::string& description) {
@@ -118,8 +134,6 @@ CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, doubl
   option->type_name("NUMBER");
   return option;
 }
-
-}  // namespace
 
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
                        const std::string& description) {

@@ -32,6 +32,9 @@ struct Frequency {
 
 enum class Sign { positive, notNegative, any };
 
+/// Whether values of an option of this type name files or folders.
+bool isFileType(std::string_view type);
+
 /// Refuses the value `text` of an option declared as `name` ("-o,--output"), saying what is allowed.
 [[noreturn]] void refuseValue(const std::string& name, const std::string& text, const std::string& allowed);
 
@@ -49,6 +52,9 @@ CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& tar
 /// A finite number in [low, high].
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double& target, double low, double high,
                        const std::string& description);
+/// The same, handed to `set`.
+CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
+                       const std::function<void(double)>& set, const std::string& description);
 /// Declares a size in pixels, each side from 1 to 65536.
 CLI::Option* addSize(CLI::App& app, const std::string& name, int& width, int& height,
                      const std::string& description);
@@ -94,6 +100,8 @@ CLI::Option* addChoice(CLI::App& app, const std::string& name, T& target,
   option->type_name(words)->default_str(standard);
   return option;
 }
+/// Refuses each value of `option` that is none of these.
+CLI::Option* allowWords(CLI::Option* option, const std::vector<std::string>& words);
 /// A file that the verb writes; `extensions` are the ones allowed ({".obj", ".ply"}).
 CLI::Option* addOutput(CLI::App& app, const std::string& name, std::string& target,
                        const std::vector<std::string>& extensions, const std::string& description,

@@ -32,13 +32,13 @@ void bindOptions(CLI::App& app, LookArguments& options) {
   app.add_option("--folder", options.folder, "Where files that the page asks for are written.")
       ->type_name("FOLDER")
       ->default_str("where it is started");
-  app.add_option(
-         "--show", options.show,
-         "What is shown first: the cloud, its surface, the mesh with a checker, wisps, the pieces of a "
-         "cut, or what is carried from the first of two meshes to the second.")
-      ->type_name("WHAT")
-      ->check(CLI::IsMember({"cloud", "surface", "checker", "wisps", "pieces", "transfer"}))
-      ->default_str("cloud; transfer for two meshes");
+  allowWords(
+      app.add_option("--show", options.show,
+                     "What is shown first: the cloud, its surface, the mesh with a checker, wisps, "
+                     "the pieces of a cut, or what is carried from the first of two meshes to the second.")
+          ->type_name("WHAT")
+          ->default_str("cloud; transfer for two meshes"),
+      {"cloud", "surface", "checker", "wisps", "pieces", "transfer"});
   app.add_flag("--no-browser", options.hasNoBrowser, "Only print the address.");
 }
 

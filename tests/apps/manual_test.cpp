@@ -67,6 +67,7 @@ TEST(Manual, CompletesInBash) {
   };
   EXPECT_EQ(completed("nephele tr", 1, "nephele"), "transfer transform\n");
   EXPECT_EQ(completed("nephele cloud --noise per", 3, "--noise"), "perlin\n");
+  EXPECT_EQ(completed("nephele render --integrator p", 3, "--integrator"), "path\n");
   EXPECT_EQ(completed("nephele cloud --noise-s", 2, "cloud"), "--noise-speed\n");
   EXPECT_EQ(completed("nephele felt ch", 2, "felt"), "check\n");
 }
@@ -84,6 +85,7 @@ TEST(Manual, CompletesInFish) {
   };
   EXPECT_EQ(completed("nephele tr"), "transfer\ntransform\n");
   EXPECT_EQ(completed("nephele cloud --noise per"), "perlin\n");
+  EXPECT_EQ(completed("nephele render --integrator p"), "path\n");
   EXPECT_EQ(completed("nephele cloud --noise-s"), "--noise-speed\n");
   EXPECT_EQ(completed("nephele felt ch"), "check\n");
   EXPECT_EQ(completed("nephele help tur"), "turntable\n");

@@ -111,6 +111,25 @@ TEST(Program, WrongValueNamesOptionValueAndRange) {
   EXPECT_NE(result.errors.find("from 0 to 16"), std::string::npos) << result.errors;
 }
 
+TEST(Program, ValuesAreRefusedInOneForm) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"render --exposure 21", "--exposure: got '21', allowed: a number from -20 to 20"},
+      {"render --exposure nan", "--exposure: got 'nan', allowed: a number from -20 to 20"},
+      {"render --sky-intensity x", "--sky-intensity: got 'x', allowed: a number from 0 to 1e+06"},
+      {"render --shadow-tolerance 1", "--shadow-tolerance: got '1', allowed: a number from 1e-06 to 0.5"},
+      {"render --sky-rotation 1e6", "--sky-rotation: got '1e6', allowed: a number from -36000 to 36000"},
+      {"render --integrator x", "--integrator: got 'x', allowed: one of march|path"},
+      {"render --aov Z,x", "--aov: got 'x', allowed: one of Z|"},
+      {"look --show x", "--show: got 'x', allowed: one of cloud|surface|"},
+      {"info --progress x", "--progress: got 'x', allowed: one of auto|alf"},
+      {"cloud a.obj -o a.vdb --layers 1 --layers 2", "--layers: is given 2 times, allowed: once"}};
+  for (const auto& [line, said] : cases) {
+    const ProgramResult result = runProgram(line);
+    EXPECT_EQ(result.exitCode, 2) << line;
+    EXPECT_NE(result.errors.find(said), std::string::npos) << line << ": " << result.errors;
+  }
+}
+
 TEST(Program, MissingInputNamesTheFile) {
   const TemporaryFolder folder;
   const ProgramResult result =

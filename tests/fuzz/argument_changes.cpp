@@ -190,16 +190,14 @@ class ArgumentChanges : Choices {
   /// and with numbers, files and names for its words in capitals.
   std::string valueOf(std::string form) {
     if (below(12) == 0) return below(2) == 0 ? field() : number();
-    form = form.substr(form.starts_with("TEXT:{") || form.starts_with("LIST:{") ? 6 : 0);
     std::string text, name;
     std::vector<std::string> alternatives{""};
     int depth = 0;
     for (const char c : form) {
       depth += c == '[' ? 1 : c == ']' ? -1 : 0;
-      const bool parts = depth == 0 && (c == '|' || (c == ',' && form.ends_with('}')));
-      if (parts)
+      if (depth == 0 && c == '|')
         alternatives.emplace_back();
-      else if (c != '}')
+      else
         alternatives.back() += c;
     }
     const std::string chosen = any(alternatives);

@@ -77,9 +77,9 @@ void checkMessage(std::string_view message, std::string_view named) {
     if (!isQuoted) own += c;
     before = c;
   }
-  for (const char* word :
-       {"std::", "json.exception", "basic_string", "vector::", "_M_", "openvdb", "Imf", "nan MB",
-        "toml::", "stoi", "stof", "map::at", "bad_alloc", "Assertion", "terminate"})
+  for (const char* word : {"std::", "json.exception", "basic_string", "vector::", "_M_", "openvdb", "Imf",
+                           "nan MB", "toml::", "stoi", "stof", "map::at", "bad_alloc", "Assertion",
+                           "terminate", "not in range", "not in {", "At Most"})
     if (own.find(word) != own.npos && whole.find(word) == whole.npos)
       fail(fmt::format("words of a library in a message: {}", message));
   if (message.find('\n') != message.npos) fail(fmt::format("more than one line: {}", message));

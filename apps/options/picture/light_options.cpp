@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <limits>
 
@@ -15,12 +14,6 @@ namespace nephele::apps {
 namespace {
 
 using Numbers = std::vector<double>;
-
-// What ranges let through is a number, or none.
-float finite(const std::string& option, double x) {
-  if (!std::isfinite(x)) refuseValue(option, "nan", "a finite number");
-  return float(x);
-}
 
 // "key=1,2,3" as "key" and "1,2,3"; the name is empty if there is none.
 std::pair<std::string, std::string> named(const std::string& text) {
@@ -202,12 +195,9 @@ void addDeepShadows(CLI::App& app, LightOptions& options) {
             "Points per voxel, along each axis, where sweeps keep the shadow. 2 is for volumes whose voxels "
             "are nearly "
             "opaque: eight times the memory.");
-  app.add_option_function<double>(
-         "--shadow-tolerance",
-         [&options](double x) { options.deepTolerance = finite("--shadow-tolerance", x); },
-         "Largest error of the transmittance in deep shadow maps.")
-      ->type_name("NUMBER")
-      ->check(CLI::Range(1e-6, 0.5))
+  addNumber(
+      app, "--shadow-tolerance", 1e-6, 0.5, [&options](double x) { options.deepTolerance = float(x); },
+      "Largest error of the transmittance in deep shadow maps.")
       ->default_str(fmt::format("{:g}", options.deepTolerance));
   addFiles(app, "--read-deep-shadow", options.readShadows,
            "Takes the shadow in a light from a deep image made from its place; of one light or of all.");
@@ -269,18 +259,14 @@ void addSky(CLI::App& app, LightOptions& options) {
          "What the ground under --sky clear reflects; it lights clouds from below.")
       ->type_name("A|R,G,B")
       ->default_str(fmt::format("{:g}", options.groundAlbedo.x));
-  app.add_option_function<double>(
-         "--sky-rotation",
-         [&options](double x) { options.sky.rotationDegrees = finite("--sky-rotation", x); },
-         "Turns the map about the vertical axis; azimuths grow by as much.")
+  addNumber(
+      app, "--sky-rotation", -36000, 36000, [&options](double x) { options.sky.rotationDegrees = float(x); },
+      "Turns the map about the vertical axis; azimuths grow by as much.")
       ->type_name("DEGREES")
-      ->check(CLI::Range(-36000.0, 36000.0))
       ->default_str("0");
-  app.add_option_function<double>(
-         "--sky-intensity", [&options](double x) { options.sky.intensity = finite("--sky-intensity", x); },
-         "Multiplies the radiance of the map, or of the clear sky.")
-      ->type_name("NUMBER")
-      ->check(CLI::Range(0.0, 1e6))
+  addNumber(
+      app, "--sky-intensity", 0, 1e6, [&options](double x) { options.sky.intensity = float(x); },
+      "Multiplies the radiance of the map, or of the clear sky.")
       ->default_str("1");
   addColourEncoding(app, "--sky-encoding", options.sky.encoding,
                     "How the numbers of the map stand for light; auto: as the file says.");

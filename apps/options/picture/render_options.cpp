@@ -64,12 +64,8 @@ void addMedium(CLI::App& app, PictureOptions& options) {
 }
 
 void addIntegrator(CLI::App& app, PictureOptions& options) {
-  app.add_option_function<std::string>(
-         "--integrator", [&options](const std::string& text) { options.pathTraced = text == "path"; },
-         "march: without noise; path: the unbiased and noisy reference.")
-      ->type_name("TEXT")
-      ->check(CLI::IsMember({"march", "path"}))
-      ->default_str("march");
+  addChoice(app, "--integrator", options.pathTraced, {{"march", false}, {"path", true}},
+            "march: without noise; path: the unbiased and noisy reference.");
   addCount(app, "--spp", options.path.samplesPerPixel, 1, 1 << 20, "Paths per pixel of --integrator path.")
       ->group("")
       ->each([&options](const std::string&) { options.pathsGiven = true; });
@@ -122,13 +118,13 @@ void addPictureOptions(CLI::App& app, PictureOptions& options) {
   std::string names = layers.front();
   for (std::size_t i = 1; i != layers.size(); ++i) names += "," + layers[i];
   layers.push_back("none");
-  app.add_option("--aov", options.render.aovs,
-                 "Layers beside R, G, B and A: none, or several of " + names + ".")
-      ->type_name("LIST")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(layers))
-      ->default_str("Z");
+  auto* aov = app.add_option("--aov", options.render.aovs,
+                             "Layers beside R, G, B and A: none, or several of " + names + ".")
+                  ->type_name("LIST")
+                  ->delimiter(',')
+                  ->allow_extra_args(false)
+                  ->default_str("Z");
+  allowWords(aov, layers);
   addViewOptions(app, options.view);
   addNumbers(
       app, "--background", "R,G,B", 3, 0, kBrightest,

@@ -1,7 +1,6 @@
 #include "apps/options/picture/view_options.h"
 
 #include <array>
-#include <cmath>
 #include <cstdlib>
 
 #include "nephele/render/image/config_view.h"
@@ -46,15 +45,10 @@ void addViewOptions(CLI::App& app, ViewOptions& options) {
                  "OpenColorIO configuration (.ocio) that views are looked up in.")
       ->type_name("FILE")
       ->default_str("$OCIO");
-  app.add_option_function<double>(
-         "--exposure",
-         [&options](double stops) {
-           if (std::isnan(stops)) refuseValue("--exposure", "nan", "a number from -20 to 20");
-           options.exposureStops = float(stops);
-         },
-         "Of the preview, in stops.")
+  addNumber(
+      app, "--exposure", -20, 20, [&options](double stops) { options.exposureStops = float(stops); },
+      "Of the preview, in stops.")
       ->type_name("STOPS")
-      ->check(CLI::Range(-20.0, 20.0))
       ->default_str("0");
 }
 
