@@ -6,9 +6,8 @@
 namespace nephele::detail {
 namespace {
 
-/// How far rounding takes index coordinates on their way to the world and back, with room.
-float roundingOf(const Vec3f& q) {
-  return 1e-3f + 1e-6f * std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z)});
+float largest(const Vec3f& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
 }  // namespace
@@ -17,9 +16,13 @@ KeptBricks::KeptBricks(const FlowMap& map) : lattice_(map.lattice) {
   for (std::size_t i = 0; i < map.bricks.size(); ++i) table_.set(map.bricks[i], std::int32_t(i));
 }
 
+float KeptBricks::roundingAt(const Vec3f& q) const {
+  return 1e-3f + 1e-6f * (largest(q) + largest(lattice_.worldToIndex.translation));
+}
+
 bool KeptBricks::hold(const Vec3f& world) const {
   const Vec3f q = lattice_.worldToIndex(world);
-  const float rounding = roundingOf(q);
+  const float rounding = roundingAt(q);
   const Vec3i brick = brickAround(q);
   if (table_.at(brick) < 0) return false;
   const Vec3f within = q - Vec3f(brick * BrickGrid::kBrick);
@@ -38,7 +41,7 @@ bool KeptBricks::moveInside(Vec3f& world) const {
   constexpr int kSearch = 2;
   const Vec3f q = lattice_.worldToIndex(world);
   const Vec3i brick = brickAround(q);
-  const float margin = 2 * roundingOf(q), last = BrickGrid::kBrick - margin;
+  const float margin = 2 * roundingAt(q), last = BrickGrid::kBrick - margin;
   float best = INFINITY;
   Vec3f found;
   for (int z = -kSearch; z <= kSearch; ++z)

@@ -18,6 +18,9 @@ class KeptBricks {
   bool moveInside(Vec3f& world) const;
 
  private:
+  /// How far rounding takes index coordinates on their way to the world and back, with room.
+  float roundingAt(const Vec3f& q) const;
+
   Lattice lattice_;
   BrickTable table_{"advection"};
 };
