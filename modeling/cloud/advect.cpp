@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 
@@ -61,6 +62,7 @@ class TraceBackNode final : public FieldNode<Vec3f> {
     const BlockLanes<3> u = frame.lanes<3>(), middle = frame.lanes<3>();
     PointBlock here = points;
     for (std::size_t step = stepCount(); step-- > 0;) {
+      CancelScope::check();
       const FieldNode<Vec3f>& velocity = velocityOf(step);
       velocity.eval(here, u, scratch);
       if (rule_ == TraceRule::midpoint) {
@@ -82,6 +84,7 @@ class TraceBackNode final : public FieldNode<Vec3f> {
     const BlockLanes<9> du = frame.lanes<9>(), half = frame.lanes<9>(), both = frame.lanes<9>();
     PointBlock here = points;
     for (std::size_t step = stepCount(); step-- > 0;) {
+      CancelScope::check();
       const FieldNode<Vec3f>& velocity = velocityOf(step);
       velocity.evalGrad(here, u, du, scratch);
       if (rule_ == TraceRule::midpoint) {
@@ -144,6 +147,7 @@ class TraceBackNode final : public FieldNode<Vec3f> {
   Box walked(const Box& box, Box& reached, RangeMemo& memo) const {
     Box here = box;
     for (std::size_t step = stepCount(); step-- > 0 && isBounded(here);) {
+      CancelScope::check();
       const NodePtr<Vec3f>& velocity = nodeOf(step);
       reached = reached.including(here);
       auto u = memo.of(velocity, here);

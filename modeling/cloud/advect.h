@@ -30,7 +30,8 @@ struct AdvectOptions {
 /// one step back. `velocity` is in world units per unit of time.
 ///
 /// The Jacobian is exact where that of the velocity is. Ranges grow by what the velocity can move a box.
-/// Cost per point: the velocity once (twice with midpoint) for every step; nothing is stored.
+/// Cost per point: the velocity once (twice with midpoint) for every step; nothing is stored. Asked within a
+/// CancelScope, it ends with any step, by Cancelled.
 /// @throws Error if dt is not finite or steps < 0.
 VectorField traceBack(const VectorField& velocity, const AdvectOptions& options = {});
 

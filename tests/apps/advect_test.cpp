@@ -178,6 +178,17 @@ TEST_F(AdvectVerb, EndsWhereMatterSpreadsBeyondTheMemoryLimit) {
   EXPECT_EQ(folder_.entryCount(), 1u);  // the cloud itself
 }
 
+TEST_F(AdvectVerb, StopsWithinTheStepsOfAWalk) {
+  // A brick of it alone would take half a minute; what has not stopped in ten seconds is killed, with code
+  // 137.
+  const ProgramResult result = runProgram(
+      "advect " + cloud() + " -o " + file("out.vdb") +
+          " --velocity curl:amplitude=0.01%,frequency=4x --steps 1000000 --method gridless --memory-limit 8G",
+      "timeout --signal=INT --kill-after=10 --preserve-status 2");
+  EXPECT_EQ(result.exitCode, 130) << result.errors;
+  EXPECT_EQ(folder_.entryCount(), 1u);  // the cloud itself
+}
+
 // Percent are of the longest side of what is carried, for each component by itself.
 TEST_F(AdvectVerb, TakesVectorsInPercent) {
   const Box box = carriedGrids(readVdbFile(cloud())).box;

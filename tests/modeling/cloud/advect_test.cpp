@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/function_field.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
@@ -130,6 +131,21 @@ TEST(Advect, RefusesBadSteps) {
   EXPECT_THROW(traceBack(turning(), {.dt = INFINITY}), Error);
   EXPECT_THROW(traceBack(turning(), {.dt = std::numeric_limits<float>::quiet_NaN()}), Error);
   EXPECT_THROW(traceBack(turning(), {.steps = -1}), Error);
+}
+
+TEST(Advect, EndsBetweenStepsWhenCancelled) {
+  // Two thousand million steps, for one point: a minute or more.
+  class Cancelling : public Progress {
+   public:
+    bool cancelled() const override { return ++asked_ > 1000; }
+
+   private:
+    mutable int asked_ = 0;
+  };
+  const VectorField far = traceBack(VectorField(Vec3f{1e-3f, 0, 0}), {.steps = 2000000000});
+  const Cancelling progress;
+  const CancelScope scope(&progress);
+  EXPECT_THROW(far(Vec3f{1, 2, 3}), Cancelled);
 }
 
 }  // namespace
