@@ -12,6 +12,13 @@
 #include <optional>
 
 namespace nephele::apps {
+namespace {
+
+std::string refusal(const std::string& text, const std::string& allowed) {
+  return fmt::format("got '{}', allowed: {}", text, allowed);
+}
+
+}  // namespace
 
 std::optional<double> parseNumber(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
@@ -31,10 +38,6 @@ std::optional<double> parseBytes(std::string_view text) {
 
 bool isFileType(std::string_view type) {
   return type.find("FILE") != type.npos || type.find("FOLDER") != type.npos;
-}
-
-static std::string refusal(const std::string& text, const std::string& allowed) {
-  return fmt::format("got '{}', allowed: {}", text, allowed);
 }
 
 void refuseValue(const std::string& name, const std::string& text, const std::string& allowed) {
@@ -115,8 +118,6 @@ CLI::Option* addFrequency(CLI::App& app, const std::string& name, Frequency& tar
   if (target.value > 0) option->default_str(fmt::format("{:g}{}", target.value, target.relative ? "x" : ""));
   return option;
 }
-
-namespace {}  // namespace
 
 CLI::Option* addNumber(CLI::App& app, const std::string& name, double low, double high,
                        const std::function<void(double)>& set, const std::string& description) {

@@ -79,9 +79,11 @@ struct AdvectedGrids {
 /// All cores; the same bits at any thread count.
 /// @throws Error if no grid holds anything, an option is outside its range, the velocity is not finite or
 /// moves matter by more than kLongestStep voxels in a step, or matter spreads over more than `mostBytes`
-/// hold; Cancelled. Source: Tessendorf, Resolution Independent Volumes, chapters 7 and 8; A. Selle and
-/// others, An Unconditionally Stable MacCormack Method (2008); T. Dupont and Y. Liu, Back and Forth Error
-/// Compensation and Correction Methods (2003).
+/// hold; Cancelled.
+///
+/// Source: Tessendorf, Resolution Independent Volumes, chapters 7 and 8; A. Selle and others, An
+/// Unconditionally Stable MacCormack Method (2008); T. Dupont and Y. Liu, Back and Forth Error Compensation
+/// and Correction Methods (2003).
 AdvectedGrids advectGrids(std::vector<std::shared_ptr<const BrickGrid>> grids, const VelocityOfStep& velocity,
                           const AdvectionOptions& options, const Progress& progress = silent());
 /// The same with a velocity that stays.
