@@ -113,8 +113,8 @@ GridHandle assembled(const detail::GrownBricks& grown, const BrickGrid& like) {
 
 /// `grid` read at map(x), on bricks from `seeds` on.
 GridHandle readThrough(const GridHandle& grid, const std::vector<Vec3i>& seeds, const VectorField& map,
-                       const std::function<bool(const Vec3f&)>& isMapped, const Progress& progress,
-                       double mostBytes) {
+                       const std::function<bool(const Vec3f&)>& isMapped, double mostBytes,
+                       const Progress& progress) {
   const Source source(grid, Interpolation::tricubic);
   const Lattice lattice = grid->lattice();
   const auto fill = [&](const Vec3i& brick, float* samples) {
@@ -259,15 +259,15 @@ void advectBySelma(AdvectedGrids& result, const VelocityOfStep& velocity, const 
   const auto bake = [&](const Progress& part) {
     if (map.isIdentity()) return;
     for (GridHandle& grid : result.grids)
-      grid = throughMap(grid, map, *matter, part,
-                        bytesLeft(result.grids, options.mostBytes) - double(map.memoryBytes()));
+      grid = throughMap(grid, map, *matter,
+                        bytesLeft(result.grids, options.mostBytes) - double(map.memoryBytes()), part);
   };
   for (int step = 0; step < options.steps; ++step) {
     const auto start = std::chrono::steady_clock::now();
     const SubProgress part(progress, double(step) / (options.steps + 1),
                            double(step + 1) / (options.steps + 1));
     map =
-        advanced(map, *matter, velocity(step), options.dt, part, bytesLeft(result.grids, options.mostBytes));
+        advanced(map, *matter, velocity(step), options.dt, bytesLeft(result.grids, options.mostBytes), part);
     progress.check();
     AdvectionStep report{.bricks = map.bricks.size(), .memoryBytes = map.memoryBytes()};
     report.foldedShare = foldedShare(map, *matter);
@@ -305,7 +305,7 @@ void advectGridless(AdvectedGrids& result, const VelocityOfStep& velocity, const
     }
     result.grids[i] = readThrough(
         result.grids[i], arrivals(result.grids[i], forward, longest), map, [](const Vec3f&) { return true; },
-        part, bytesLeft(result.grids, options.mostBytes));
+        bytesLeft(result.grids, options.mostBytes), part);
   }
 }
 
@@ -347,13 +347,13 @@ void requireSane(const std::vector<GridHandle>& grids, const AdvectionOptions& o
 
 }  // namespace
 
-GridHandle throughMap(const GridHandle& grid, const FlowMap& map, const Matter& matter,
-                      const Progress& progress, double mostBytes) {
+GridHandle throughMap(const GridHandle& grid, const FlowMap& map, const Matter& matter, double mostBytes,
+                      const Progress& progress) {
   if (map.isIdentity()) return grid;
   const detail::KeptBricks kept(map);
   const std::vector<Vec3i> seeds = overlapping(matterBricks(map, matter), map.lattice, grid->lattice());
   return readThrough(
-      grid, seeds, mapField(map), [&](const Vec3f& p) { return kept.hold(p); }, progress, mostBytes);
+      grid, seeds, mapField(map), [&](const Vec3f& p) { return kept.hold(p); }, mostBytes, progress);
 }
 
 AdvectedGrids advectGrids(std::vector<GridHandle> grids, const VelocityOfStep& velocity,

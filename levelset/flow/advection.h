@@ -93,8 +93,9 @@ AdvectedGrids advectGrids(std::vector<std::shared_ptr<const BrickGrid>> grids, c
 /// `grid` read through `map`, on its own voxels: what advectGrids does last with selma.
 /// @throws Error if the result takes more than `mostBytes`; Cancelled.
 std::shared_ptr<const BrickGrid> throughMap(const std::shared_ptr<const BrickGrid>& grid, const FlowMap& map,
-                                            const Matter& matter, const Progress& progress = silent(),
-                                            double mostBytes = std::numeric_limits<double>::infinity());
+                                            const Matter& matter,
+                                            double mostBytes = std::numeric_limits<double>::infinity(),
+                                            const Progress& progress = silent());
 
 /// Memory that `advectGrids` needs, bytes, if matter spreads to about twice the bricks that it fills now.
 /// @throws Error if no grid holds anything, as advectGrids does.

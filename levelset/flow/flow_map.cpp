@@ -185,7 +185,7 @@ std::vector<Vec3i> matterBricks(const FlowMap& map, const Matter& matter) {
 }
 
 FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& velocity, float dt,
-                 const Progress& progress, double mostBytes) {
+                 double mostBytes, const Progress& progress) {
   require(std::isfinite(dt), "advection: dt must be finite");
   const Lattice& lattice = map.lattice;
   const VectorField back = traceBack(velocity, {.dt = dt});
@@ -206,10 +206,12 @@ FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& ve
     BrickPoints read = source;
     std::array<bool, kBrickSamples> isInside, isKnown;
     for (int i = 0; i < kBrickSamples; ++i) {
-      Vec3f p = source[i];
-      isInside[std::size_t(i)] = map.isIdentity() || kept.hold(p);
-      isKnown[std::size_t(i)] = isInside[std::size_t(i)] || kept.moveInside(p);
-      read.set(i, p);
+      const auto k = std::size_t(i);
+      isInside[k] = isKnown[k] = map.isIdentity() || kept.hold(source[i]);
+      if (isInside[k]) continue;
+      Vec3f nearest = source[i];
+      isKnown[k] = kept.moveInside(nearest);
+      read.set(i, nearest);
     }
     displacement.eval({read.x, read.y, read.z}, spansOf(moved));
     if (!repeatKnown(isKnown, moved)) {

@@ -66,8 +66,8 @@ FlowMap identityMap(const Matter& matter);
 /// @throws Error if dt is not finite, the velocity is not, it carries a voxel farther than kLongestStep
 /// voxels, or the map and the one before it take more than `mostBytes`; Cancelled.
 FlowMap advanced(const FlowMap& map, const Matter& matter, const VectorField& velocity, float dt,
-                 const Progress& progress = silent(),
-                 double mostBytes = std::numeric_limits<double>::infinity());
+                 double mostBytes = std::numeric_limits<double>::infinity(),
+                 const Progress& progress = silent());
 
 /// Voxels that one step may move matter by.
 inline constexpr float kLongestStep = 256.0f;

@@ -179,8 +179,7 @@ TEST_F(AdvectVerb, EndsWhereMatterSpreadsBeyondTheMemoryLimit) {
 }
 
 TEST_F(AdvectVerb, StopsWithinTheStepsOfAWalk) {
-  // A brick of it alone would take half a minute; what has not stopped in ten seconds is killed, with code
-  // 137.
+  // What has not stopped ten seconds after the signal is killed, with code 137.
   const ProgramResult result = runProgram(
       "advect " + cloud() + " -o " + file("out.vdb") +
           " --velocity curl:amplitude=0.01%,frequency=4x --steps 1000000 --method gridless --memory-limit 8G",

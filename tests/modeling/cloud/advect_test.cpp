@@ -134,7 +134,6 @@ TEST(Advect, RefusesBadSteps) {
 }
 
 TEST(Advect, EndsBetweenStepsWhenCancelled) {
-  // Two thousand million steps, for one point: a minute or more.
   class Cancelling : public Progress {
    public:
     bool cancelled() const override { return ++asked_ > 1000; }
