@@ -6,7 +6,6 @@
 #include "apps/options/velocity_options.h"
 #include "nephele/levelset/flow/advection.h"
 #include "nephele/levelset/flow/advection_files.h"
-#include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"
 #include "nephele/modeling/shape/shapes.h"
@@ -44,7 +43,6 @@ VdbGrid CloudAdvectionArguments::carried(const VdbGrid& density, FieldSources& s
   VectorField carrier = Vec3f{};
   if (most > 0) carrier = velocity.field(longestSide) * (way / most);
   if (wind) carrier = carrier + windOver(sources, seed);
-  const CancelScope scope(&run);
   return toVdb(grids, advectGrids(grids.bricks, carrier, options, run).grids).front();
 }
 

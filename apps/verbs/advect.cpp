@@ -4,7 +4,6 @@
 #include "apps/options/advect_options.h"
 #include "nephele/levelset/flow/advection_files.h"
 #include "nephele/modeling/base/error.h"
-#include "nephele/modeling/base/parallel.h"
 
 namespace nephele::apps {
 namespace {
@@ -49,8 +48,6 @@ void carry(const AdvectArguments& arguments, Run& run) {
       namingFile(arguments.input, [&] { return estimatedAdvectionBytes(input.bricks, options); }),
       "use a larger --map-coarseness, or larger voxels in the input");
 
-  // A walk through all steps may take long within one piece of a loop.
-  const CancelScope scope(&run);
   run.begin("advect");
   run.expect(0.05, 0.9);
   // Velocities that are too fast are so beside the voxels of the input.
