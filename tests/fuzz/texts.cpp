@@ -8,6 +8,7 @@
 #include <set>
 
 #include "apps/app.h"
+#include "apps/detail/command.h"
 #include "apps/options/config_file.h"
 #include "apps/options/field_sources.h"
 #include "apps/options/field_value.h"
@@ -85,12 +86,8 @@ const apps::Verb& verbCalled(std::string_view name) {
 
 /// Parses arguments as a verb does; its body does not run.
 void parse(const apps::Verb& verb, std::vector<std::string> arguments) {
-  CLI::App app(verb.summary, verb.name);
-  const apps::BoundVerb bound = verb.bind(app);
-  app.allow_extras();
-  arguments = apps::withConfigFile({app, verb.name, verbNames()}, std::move(arguments));
-  std::reverse(arguments.begin(), arguments.end());
-  app.parse(std::move(arguments));
+  apps::Command command(verb);
+  command.parse(apps::withConfigFile({command.app, verb.name, verbNames()}, std::move(arguments)));
 }
 
 void useCameraMotion(const CameraMotion& motion) {
