@@ -129,6 +129,23 @@ TEST(ScatteredLight, GoesToTheEyeTogetherAsItDoesAlone) {
   });
 }
 
+TEST(ScatteredLight, OfOtherAlbedosGoesToTheEyeTogetherAsItDoesAlone) {
+  const RenderVolume volume(ball(1.0f, 0.1f));
+  const Vec3f towards{0.3f, 0.8f, 0.4f};
+  const LightVolume sun(volume, towards);
+  // As where objects cast shadows: cells so deep are all thinned alike, up to the same depth.
+  ScatteredSource source = ScatteredSource::of(sun, towards);
+  source.thinned = nullptr;
+  std::vector<ScatteredLight> lights;
+  for (const float albedo : {0.5f, 0.625f, 0.75f, 0.875f, 1.0f})
+    lights.emplace_back(volume, scattering(200.0f, albedo, 0.85f), source);
+  std::vector<const ScatteredLight*> all;
+  for (const ScatteredLight& light : lights) all.push_back(&light);
+  const Viewpoint viewpoint{Vec3f{0, 1, 5}, {}};
+  const auto together = ScatteredLight::towards(all, viewpoint);
+  for (std::size_t k = 0; k != all.size(); ++k) EXPECT_EQ(together[k], all[k]->towards(viewpoint)) << k;
+}
+
 TEST(ScatteredLight, EndsWithinItsTolerance) {
   // A sweep leaves about as much to change as it has changed, one and a half times that with what is
   // extrapolated from it: sixty sweeps change no more of all light, and little of it where it is dark.
