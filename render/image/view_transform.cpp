@@ -132,8 +132,8 @@ float usable(float x) {
 
 // In [-0.5, 0.5), its error high in frequency: hides the steps of 8 bits in smooth skies without visible
 // grain.
-float dither(std::size_t x, std::size_t y) {
-  const double d = 0.7548776662466927 * double(x) + 0.5698402909980532 * double(y);
+float dither(double x, double y) {
+  const double d = 0.7548776662466927 * x + 0.5698402909980532 * y;
   return float(d - std::floor(d)) - 0.5f;
 }
 
@@ -194,9 +194,11 @@ std::vector<float> displayed(const Image& image, const ViewTransform& view) {
 std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view) {
   const std::vector<float> screen = displayed(image, view);
   const auto width = std::size_t(image.width);
+  const Image::Display display = image.display.value_or(Image::Display{});
   std::vector<std::uint8_t> bytes(screen.size());
   for (std::size_t i = 0; i != screen.size(); ++i) {
-    const float value = std::floor(screen[i] * 255.0f + 0.5f + 0.999f * dither(i / 3 % width, i / 3 / width));
+    const double x = double(display.x) + double(i / 3 % width), y = double(display.y) + double(i / 3 / width);
+    const float value = std::floor(screen[i] * 255.0f + 0.5f + 0.999f * dither(x, y));
     bytes[i] = std::uint8_t(std::fmin(255.0f, std::fmax(0.0f, value)));
   }
   return bytes;

@@ -56,7 +56,7 @@ struct ViewTransform {
 std::vector<float> displayed(const Image& image, const ViewTransform& view);
 
 /// The same in 8 bits, as files for the screen hold it, dithered by less than a step; the pattern stands
-/// still from frame to frame.
+/// still from frame to frame, and goes through parts of a picture.
 std::vector<std::uint8_t> screenBytes(const Image& image, const ViewTransform& view);
 
 }  // namespace nephele

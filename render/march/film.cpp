@@ -25,8 +25,12 @@ std::size_t Film::channelCount(const std::vector<std::string>& layers, std::size
 
 Film::Film(const Camera& camera, const std::vector<std::string>& lights,
            const std::vector<std::string>& layers)
-    : window_(camera.window()), lightCount_(lights.size()) {
-  image_.setWindow(camera.window(), camera.width(), camera.height());
+    : Film(camera.window(), {0, 0, camera.width(), camera.height()}, lights, layers) {}
+
+Film::Film(const PixelBox& window, const PixelBox& picture, const std::vector<std::string>& lights,
+           const std::vector<std::string>& layers)
+    : window_(window), picture_(picture), lights_(lights), layers_(layers) {
+  image_.setWindow(window, picture.width(), picture.height());
   for (const char* name : {"R", "G", "B", "A"}) image_.add(name);
   const std::vector<std::string> colours{"R", "G", "B"}, axes{"X", "Y", "Z"};
   for (const std::string& layer : layers) {
@@ -71,6 +75,27 @@ Film::Film(const RenderScene& scene, const FilmOptions& options)
                       std::vector<std::vector<DeepSample>>(image_.channels.front().values.size())};
 }
 
+PixelBox Film::reach() const {
+  if (options_.adaptiveThreshold == 0) return window_;
+  return window_.grownBy(reachOf(kFirstApart)).sharedWith(picture_);
+}
+
+Film Film::part(const PixelBox& window) const {
+  Film part(window, picture_, lights_, layers_);
+  part.options_ = options_;
+  return part;
+}
+
+void Film::take(const Film& part) {
+  const PixelBox both = window_.sharedWith(part.window_);
+  for (std::size_t c = 0; c != image_.channels.size(); ++c)
+    for (int y = both.y0; y < both.y1; ++y) {
+      const float* from = part.image_.channels[c].values.data();
+      std::copy(from + part.placeOf(both.x0, y), from + part.placeOf(both.x0, y) + both.width(),
+                image_.channels[c].values.data() + placeOf(both.x0, y));
+    }
+}
+
 int Film::addLayer(const std::string& name, const std::vector<std::string>& parts) {
   const int first = int(image_.channels.size());
   const auto add = [&](const std::string& channel) {
@@ -89,14 +114,14 @@ void Film::setColour(int channel, std::size_t at, const Vec3f& colour) {
 
 void Film::set(std::size_t at, const PixelSum& pixel) {
   Vec3f colour = pixel.emission;
-  for (std::size_t i = 0; i != lightCount_; ++i) colour += pixel.light[i];
+  for (std::size_t i = 0; i != lights_.size(); ++i) colour += pixel.light[i];
   setColour(0, at, colour);
   value(3, at) = pixel.alpha;
   setColour(transmittance_, at, Vec3f{1, 1, 1} - pixel.opacity);
   setColour(albedo_, at, pixel.albedo);
   setColour(emission_, at, pixel.emission);
   if (light_ >= 0)
-    for (std::size_t i = 0; i != lightCount_; ++i) setColour(light_ + int(i) * 3, at, pixel.light[i]);
+    for (std::size_t i = 0; i != lights_.size(); ++i) setColour(light_ + int(i) * 3, at, pixel.light[i]);
   if (depth_ >= 0) value(depth_, at) = pixel.depth;
 }
 
@@ -122,7 +147,7 @@ bool Film::interpolate(std::size_t at, const std::array<std::size_t, 4>& from, f
   setMeans(0, 4, at, from);
   for (const int layer : {transmittance_, albedo_, emission_})
     if (layer >= 0) setMeans(layer, 3, at, from);
-  if (light_ >= 0) setMeans(light_, 3 * int(lightCount_), at, from);
+  if (light_ >= 0) setMeans(light_, 3 * int(lights_.size()), at, from);
   return true;
 }
 

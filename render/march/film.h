@@ -57,6 +57,11 @@ class Film {
   const FilmOptions& options() const { return options_; }
   /// The pixels of the picture that are here, and the place of one of them in what follows.
   const PixelBox& window() const { return window_; }
+  /// The whole picture, which the window is a part of.
+  const PixelBox& picture() const { return picture_; }
+  /// The pixels of the picture that may be integrated: those of the window, and where only some pixels are,
+  /// as many around it as the others may depend on.
+  PixelBox reach() const;
   std::size_t placeOf(int x, int y) const {
     return std::size_t(y - window_.y0) * std::size_t(window_.width()) + std::size_t(x - window_.x0);
   }
@@ -75,6 +80,11 @@ class Film {
   bool wantsNormals() const { return normal_ >= 0; }
   bool wantsDepth() const { return depth_ >= 0; }
 
+  /// A film of the same kind, empty, for other pixels of the picture. Not for deep pictures.
+  Film part(const PixelBox& window) const;
+  /// Takes over the pixels that both hold.
+  void take(const Film& part);
+
   Image& image() { return image_; }
   /// Nothing where options().deep does not ask for it.
   std::optional<DeepImage>& deep() { return deep_; }
@@ -84,17 +94,25 @@ class Film {
   /// The layers that there are, for help texts and checks.
   static const std::vector<std::string>& layerNames();
 
+  /// Pixels from one to the next that is integrated first, where only some are.
+  static constexpr int kFirstApart = 4;
+  /// How far from a pixel those lie that it may depend on, of pixels `apart` from each other: each of those
+  /// between is asked for its neighbours at half the distance, twice, and so on down to 1.
+  static constexpr int reachOf(int apart) { return 2 * (apart - 1); }
+
  private:
+  Film(const PixelBox& window, const PixelBox& picture, const std::vector<std::string>& lights,
+       const std::vector<std::string>& layers);
   int addLayer(const std::string& name, const std::vector<std::string>& parts);
   void setColour(int channel, std::size_t at, const Vec3f& colour);
   void setMeans(int first, int count, std::size_t at, const std::array<std::size_t, 4>& from);
   float& value(int channel, std::size_t at) { return image_.channels[std::size_t(channel)].values[at]; }
 
   FilmOptions options_;
-  PixelBox window_;
+  PixelBox window_, picture_;
+  std::vector<std::string> lights_, layers_;
   Image image_;
   std::optional<DeepImage> deep_;
-  std::size_t lightCount_;
   int depth_ = -1, medianDepth_ = -1, meanDepth_ = -1, normal_ = -1, position_ = -1, motion_ = -1;
   int transmittance_ = -1, albedo_ = -1, emission_ = -1, light_ = -1;
 };

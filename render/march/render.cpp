@@ -14,42 +14,48 @@ namespace {
 
 // Where only some pixels are integrated: wide enough that few of them are at a border.
 constexpr int kAdaptiveTile = 32;
-// How far apart the first of these are.
-constexpr int kApart = 4;
-
 // Fills tiles of a film where only some pixels are integrated: pixels far apart first, then those in the
 // middle of four, then those between, and so on half as far apart. Neighbours beyond the tile are not asked,
-// so that tiles do not depend on each other.
+// so that tiles do not depend on each other. Of the tile only what is wanted is filled, and what that depends
+// on.
 class AdaptivePasses {
  public:
+  /// `film` is of one tile.
   AdaptivePasses(Integrator::TileWorker& worker, const Integrator& integrator, Film& film)
       : worker_(worker),
         film_(film),
+        tile_(film.window()),
         threshold_(film.options().adaptiveThreshold),
         faint_(integrator.faintRadiance()) {}
 
-  void run(const PixelBox& tile) {
-    for (int y = tile.y0; y < tile.y1; y += kApart)
-      for (int x = tile.x0; x < tile.x1; x += kApart) integrate(x, y);
-    for (int apart = kApart; apart != 1; apart /= 2) {
+  void run(const PixelBox& wanted) {
+    const int first = Film::kFirstApart;
+    needed_ = wanted.grownBy(Film::reachOf(first));
+    for (int y = tile_.y0; y < tile_.y1; y += first)
+      for (int x = tile_.x0; x < tile_.x1; x += first)
+        if (needed_.contains(x, y)) integrate(x, y);
+    for (int apart = first; apart != 1; apart /= 2) {
       const int half = apart / 2;
-      for (int y = tile.y0 + half; y < tile.y1; y += apart)
-        for (int x = tile.x0 + half; x < tile.x1; x += apart)
-          fill(tile, x, y, {{{-half, -half}, {half, -half}, {-half, half}, {half, half}}});
-      for (int y = tile.y0; y < tile.y1; y += half)
-        for (int x = tile.x0 + ((y - tile.y0) % apart == 0 ? half : 0); x < tile.x1; x += apart)
-          fill(tile, x, y, {{{-half, 0}, {half, 0}, {0, -half}, {0, half}}});
+      needed_ = wanted.grownBy(Film::reachOf(half) + half);
+      for (int y = tile_.y0 + half; y < tile_.y1; y += apart)
+        for (int x = tile_.x0 + half; x < tile_.x1; x += apart)
+          fill(x, y, {{{-half, -half}, {half, -half}, {-half, half}, {half, half}}});
+      needed_ = wanted.grownBy(Film::reachOf(half));
+      for (int y = tile_.y0; y < tile_.y1; y += half)
+        for (int x = tile_.x0 + ((y - tile_.y0) % apart == 0 ? half : 0); x < tile_.x1; x += apart)
+          fill(x, y, {{{-half, 0}, {half, 0}, {0, -half}, {0, half}}});
     }
   }
 
  private:
   void integrate(int x, int y) { worker_.integrate({x, y, x + 1, y + 1}, film_); }
 
-  void fill(const PixelBox& tile, int x, int y, const std::array<std::array<int, 2>, 4>& around) {
+  void fill(int x, int y, const std::array<std::array<int, 2>, 4>& around) {
+    if (!needed_.contains(x, y)) return;
     std::array<std::size_t, 4> from;
     for (std::size_t i = 0; i != 4; ++i) {
       const int nextX = x + around[i][0], nextY = y + around[i][1];
-      if (nextX < tile.x0 || nextY < tile.y0 || nextX >= tile.x1 || nextY >= tile.y1) return integrate(x, y);
+      if (!tile_.contains(nextX, nextY)) return integrate(x, y);
       from[i] = film_.placeOf(nextX, nextY);
     }
     if (!film_.interpolate(film_.placeOf(x, y), from, threshold_, faint_)) integrate(x, y);
@@ -57,6 +63,7 @@ class AdaptivePasses {
 
   Integrator::TileWorker& worker_;
   Film& film_;
+  PixelBox tile_, needed_;
   float threshold_, faint_;
 };
 
@@ -87,7 +94,11 @@ RenderResult render(const RenderScene& scene, Integrator& integrator, Film film,
   const FilmOptions& options = film.options();
   const bool isAdaptive = options.adaptiveThreshold > 0;
   const int side = isAdaptive ? kAdaptiveTile : integrator.tileSize();
-  const int across = (window.width() + side - 1) / side, down = (window.height() + side - 1) / side;
+  // The tiles of adaptive pictures are those of the whole, so that its parts fit together.
+  const PixelBox whole = isAdaptive ? film.picture() : window;
+  const int firstX = window.x0 - (window.x0 - whole.x0) % side,
+            firstY = window.y0 - (window.y0 - whole.y0) % side;
+  const int across = (window.x1 - firstX + side - 1) / side, down = (window.y1 - firstY + side - 1) / side;
   std::atomic<std::uint64_t> samples{0}, rays{0};
   std::mutex observing;
   parallelFor(
@@ -95,13 +106,17 @@ RenderResult render(const RenderScene& scene, Integrator& integrator, Film film,
       [&](std::size_t begin, std::size_t end) {
         const std::unique_ptr<Integrator::TileWorker> worker = integrator.worker();
         for (std::size_t i = begin; i != end; ++i) {
-          const int x0 = window.x0 + int(i % std::size_t(across)) * side,
-                    y0 = window.y0 + int(i / std::size_t(across)) * side;
-          const PixelBox tile{x0, y0, std::min(x0 + side, window.x1), std::min(y0 + side, window.y1)};
-          if (isAdaptive)
-            AdaptivePasses(*worker, integrator, film).run(tile);
-          else
+          const int x0 = firstX + int(i % std::size_t(across)) * side,
+                    y0 = firstY + int(i / std::size_t(across)) * side;
+          const PixelBox ofWhole = PixelBox{x0, y0, x0 + side, y0 + side}.sharedWith(whole),
+                         tile = ofWhole.sharedWith(window);
+          if (isAdaptive) {
+            Film part = film.part(ofWhole);
+            AdaptivePasses(*worker, integrator, part).run(tile);
+            film.take(part);
+          } else {
             worker->integrate(tile, film);
+          }
           if (film.wantsPoints()) worker->findPoints(tile, film);
           if (!options.onTile) continue;
           const std::lock_guard lock(observing);

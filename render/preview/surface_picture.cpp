@@ -37,6 +37,8 @@ constexpr int kPerLook = 2;
 /// Steps between the pixels that are smoothed over: of the lamp's light, whose shadows have edges, and of the
 /// sky's.
 constexpr int kLampSteps = 2, kSkySteps = 8;
+// Twice all steps, each twice as far as the one before.
+constexpr int kSmoothReach = 2 * (2 * kSkySteps - 1);
 
 using Numbers = std::array<double, 6>;
 
@@ -270,8 +272,7 @@ Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int sample
   require(samples >= 1 && samples <= 65536,
           fmt::format("picture: samples must be from 1 to 65536, got {}", samples));
   const Box& box = surfaces.box();
-  const PixelBox window = camera.window();
-  const double middleX = 0.5 * (window.x0 + window.x1), middleY = 0.5 * (window.y0 + window.y1);
+  const double middleX = 0.5 * camera.width(), middleY = 0.5 * camera.height();
   const Ray ahead = camera.ray(middleX, middleY), beside = camera.ray(middleX + 1, middleY);
   // Over the left shoulder of the camera.
   const double azimuth = std::atan2(-ahead.direction.x, -ahead.direction.z) - 52 * M_PI / 180,
@@ -286,30 +287,33 @@ Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int sample
       length(beside.direction - ahead.direction),
       length(beside.origin - ahead.origin)};
 
-  const auto width = std::size_t(window.width()), height = std::size_t(window.height());
+  // What smoothing mixes into the pixels of a part is the same as in the whole.
+  const PixelBox window = camera.window(),
+                 seen = window.grownBy(kSmoothReach).sharedWith({0, 0, camera.width(), camera.height()});
+  const auto width = std::size_t(seen.width()), height = std::size_t(seen.height());
   std::vector<Seen> pixels(width * height);
   parallelFor(
       height, 2,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t y = begin; y < end; ++y)
           for (std::size_t x = 0; x < width; ++x)
-            pixels[y * width + x] =
-                scene.look(std::size_t(window.x0) + x, std::size_t(window.y0) + y, samples);
+            pixels[y * width + x] = scene.look(std::size_t(seen.x0) + x, std::size_t(seen.y0) + y, samples);
       },
       progress);
-  smooth(pixels, window.width(), window.height(), SubProgress(progress, 1, 1));
+  smooth(pixels, seen.width(), seen.height(), SubProgress(progress, 1, 1));
   Image image;
-  image.width = window.width();
-  image.height = window.height();
-  if (window.width() != camera.width() || window.height() != camera.height())
-    image.display = Image::Display{window.x0, window.y0, camera.width(), camera.height()};
+  image.setWindow(window, camera.width(), camera.height());
   for (const char* name : {"R", "G", "B", "A"}) image.add(name);
-  for (std::size_t at = 0; at != pixels.size(); ++at) {
-    const Seen& seen = pixels[at];
-    const Vec3f light = seen.facing * kLamp * seen.lamp + seen.colour * seen.sky + kBackdrop * seen.backdrop;
-    for (int c = 0; c < 3; ++c) image.channels[std::size_t(c)].values[at] = light[c];
-    image.channels[3].values[at] = 1;
-  }
+  for (int y = window.y0; y != window.y1; ++y)
+    for (int x = window.x0; x != window.x1; ++x) {
+      const Seen& pixel = pixels[std::size_t(y - seen.y0) * width + std::size_t(x - seen.x0)];
+      const Vec3f light =
+          pixel.facing * kLamp * pixel.lamp + pixel.colour * pixel.sky + kBackdrop * pixel.backdrop;
+      const std::size_t at =
+          std::size_t(y - window.y0) * std::size_t(window.width()) + std::size_t(x - window.x0);
+      for (int c = 0; c < 3; ++c) image.channels[std::size_t(c)].values[at] = light[c];
+      image.channels[3].values[at] = 1;
+    }
   return image;
 }
 

@@ -17,28 +17,32 @@ namespace {
 
 // Largest side of a tile in pixels, and how many are to be across a picture at least.
 constexpr int kTile = 16, kTiles = 64;
-constexpr int kDepths = 9;
+// Depths in metres from one to twice as many, from 1 on.
+constexpr int kPerOctave = 4;
 
-// The air before the corners of tiles, at depths evenly between two.
+// The air before the corners of tiles, at some depths. Tiles are those of the whole picture and depths powers
+// of one number, so that parts of a picture fit together.
 class AirGrid {
  public:
-  AirGrid(const Image& image, const Camera& camera, const AerialPerspective& air, float near, float far)
-      : tile_(std::clamp(image.width / kTiles, 1, kTile)),
-        across_((image.width + tile_ - 1) / tile_ + 1),
-        near_(near),
-        perDepth_(far > near ? float(kDepths - 1) / (far - near) : 0.0f) {
-    const int down = (image.height + tile_ - 1) / tile_ + 1;
-    nodes_.resize(std::size_t(across_) * std::size_t(down) * kDepths);
+  AirGrid(const Camera& camera, const AerialPerspective& air, float near, float far)
+      : tile_(std::clamp(camera.width() / kTiles, 1, kTile)),
+        offX_(camera.window().x0 % tile_),
+        offY_(camera.window().y0 % tile_),
+        metresPerUnit_(air.metresPerUnit),
+        first_(levelOf(near * metresPerUnit_)),
+        levels_(levelOf(far * metresPerUnit_) + 2 - first_) {
     const PixelBox window = camera.window();
-    parallelFor(nodes_.size() / kDepths, 1, [&](std::size_t begin, std::size_t end) {
+    across_ = (window.width() + offX_ + tile_ - 1) / tile_ + 1;
+    const int down = (window.height() + offY_ + tile_ - 1) / tile_ + 1;
+    nodes_.resize(std::size_t(across_) * std::size_t(down) * std::size_t(levels_));
+    parallelFor(nodes_.size() / std::size_t(levels_), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i) {
-        const Ray ray = camera.ray(window.x0 + double(i % std::size_t(across_)) * tile_,
-                                   window.y0 + double(i / std::size_t(across_)) * tile_);
+        const Ray ray = camera.ray(window.x0 - offX_ + double(i % std::size_t(across_)) * tile_,
+                                   window.y0 - offY_ + double(i / std::size_t(across_)) * tile_);
         const double perDepth = 1 / std::max(dot(ray.direction, camera.forward()), 1e-3);
-        for (int n = 0; n != kDepths; ++n) {
-          const double depth = double(near) + double(far - near) * n / (kDepths - 1);
-          ClearSky::Air& node = nodes_[i * kDepths + std::size_t(n)];
-          node = air.sky.airBefore(Vec3f(ray.direction), float(depth * perDepth * double(air.metresPerUnit)));
+        for (int n = 0; n != levels_; ++n) {
+          ClearSky::Air& node = nodes_[i * std::size_t(levels_) + std::size_t(n)];
+          node = air.sky.airBefore(Vec3f(ray.direction), float(metresOf(first_ + n) * perDepth));
           node.light *= air.intensity;
         }
       }
@@ -46,16 +50,19 @@ class AirGrid {
   }
 
   ClearSky::Air at(int x, int y, float depth) const {
-    const float u = (float(x) + 0.5f) / float(tile_), v = (float(y) + 0.5f) / float(tile_),
-                w = std::clamp((depth - near_) * perDepth_, 0.0f, float(kDepths - 1) - 1e-3f);
-    const int i = int(u), j = int(v), k = int(w);
+    const float metres = depth * metresPerUnit_;
+    const int level = levelOf(metres), k = level - first_;
+    const double from = metresOf(level), share = (double(metres) - from) / (metresOf(level + 1) - from);
+    const float u = (float(x + offX_) + 0.5f) / float(tile_), v = (float(y + offY_) + 0.5f) / float(tile_),
+                w = std::clamp(float(share), 0.0f, 1.0f);
+    const int i = int(u), j = int(v);
     ClearSky::Air result{{}, {}};
     for (int corner = 0; corner != 8; ++corner) {
       const int di = corner & 1, dj = corner >> 1 & 1, dk = corner >> 2;
-      const float weight = (di ? u - float(i) : 1 - u + float(i)) * (dj ? v - float(j) : 1 - v + float(j)) *
-                           (dk ? w - float(k) : 1 - w + float(k));
+      const float weight =
+          (di ? u - float(i) : 1 - u + float(i)) * (dj ? v - float(j) : 1 - v + float(j)) * (dk ? w : 1 - w);
       const ClearSky::Air& node =
-          nodes_[(std::size_t(j + dj) * std::size_t(across_) + std::size_t(i + di)) * kDepths +
+          nodes_[(std::size_t(j + dj) * std::size_t(across_) + std::size_t(i + di)) * std::size_t(levels_) +
                  std::size_t(k + dk)];
       result.left += node.left * weight;
       result.light += node.light * weight;
@@ -64,8 +71,15 @@ class AirGrid {
   }
 
  private:
-  int tile_, across_;
-  float near_, perDepth_;
+  // Depths are those of whole levels, and 0.
+  static double metresOf(int level) { return level < 0 ? 0.0 : std::exp2(double(level) / kPerOctave); }
+  static int levelOf(float metres) {
+    return metres < 1 ? -1 : int(std::floor(std::log2(std::min(metres, 1e30f)) * float(kPerOctave)));
+  }
+
+  int tile_, offX_, offY_, across_ = 0;
+  float metresPerUnit_;
+  int first_, levels_;
   std::vector<ClearSky::Air> nodes_;
 };
 
@@ -101,7 +115,7 @@ void addAir(Image& image, const Camera& camera, const AerialPerspective& air) {
   if (hasLights)
     for (const char* name : {"light_air.R", "light_air.G", "light_air.B"}) image.add(name, false);
   if (!(near <= far)) return;
-  const AirGrid grid(image, camera, air, near, far);
+  const AirGrid grid(camera, air, near, far);
   const auto alpha =
       std::size_t(std::ranges::find(image.channels, "A", &Image::Channel::name) - image.channels.begin());
   parallelFor(std::size_t(image.height), 16, [&](std::size_t begin, std::size_t end) {

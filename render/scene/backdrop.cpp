@@ -29,22 +29,24 @@ void addBackdrop(Image& image, const Camera& camera, const Lights& lights) {
   const std::size_t first = image.channels.size();
   for (const char* name : {"backdrop.R", "backdrop.G", "backdrop.B"}) image.add(name);
   const PixelBox window = camera.window();
-  // Between nodes it is interpolated.
+  // Between nodes it is interpolated: those of the whole picture, so that its parts fit together.
   const int apart = lights.clear ? kApart : 1;
-  const int across = image.width / apart + 2, down = image.height / apart + 2;
+  const int offX = window.x0 % apart, offY = window.y0 % apart;
+  const int across = (image.width + offX) / apart + 2, down = (image.height + offY) / apart + 2;
   std::vector<Vec3f> nodes(std::size_t(across) * std::size_t(down));
   parallelFor(nodes.size(), std::size_t(across), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const Ray ray = camera.ray(window.x0 + double(i % std::size_t(across)) * apart + 0.5,
-                                 window.y0 + double(i / std::size_t(across)) * apart + 0.5);
+      const Ray ray = camera.ray(window.x0 - offX + double(i % std::size_t(across)) * apart + 0.5,
+                                 window.y0 - offY + double(i / std::size_t(across)) * apart + 0.5);
       nodes[i] = radiance(Vec3f(ray.direction), lights);
     }
   });
   parallelFor(std::size_t(image.height), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y != end; ++y)
       for (int x = 0; x != image.width; ++x) {
-        const float u = float(x % apart) / float(apart), v = float(int(y) % apart) / float(apart);
-        const Vec3f* at = nodes.data() + std::size_t(int(y) / apart) * std::size_t(across) + x / apart;
+        const int i = x + offX, j = int(y) + offY;
+        const float u = float(i % apart) / float(apart), v = float(j % apart) / float(apart);
+        const Vec3f* at = nodes.data() + std::size_t(j / apart) * std::size_t(across) + i / apart;
         const Vec3f colour =
             (at[0] * (1 - u) + at[1] * u) * (1 - v) + (at[across] * (1 - u) + at[across + 1] * u) * v;
         for (std::size_t c = 0; c != 3; ++c)

@@ -61,8 +61,10 @@ struct Seen {
 
 }  // namespace
 
-DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera)
-    : window_(camera.window()), across_((window_.width() + kCell - 1) / kCell) {
+DepthBounds::DepthBounds(const RenderVolume& volume, const Camera& camera, const PixelBox& window)
+    // Cells of the whole picture, as rays begin where these say.
+    : window_{window.x0 / kCell * kCell, window.y0 / kCell * kCell, window.x1, window.y1},
+      across_((window_.width() + kCell - 1) / kCell) {
   const int down = (window_.height() + kCell - 1) / kCell;
   cells_.resize(std::size_t(across_) * std::size_t(down));
   const BrickGrid& grid = volume.density();

@@ -19,12 +19,13 @@ class DepthBounds {
     bool isEmpty() const { return near > far; }
   };
 
-  /// For pictures of `camera` where it stands at the frame, through a pinhole. A volume that reaches behind
-  /// the camera may be anywhere. Cost: some 10^4 boxes projected, and one pass over the occupied bricks.
-  DepthBounds(const RenderVolume& volume, const Camera& camera);
+  /// For the pixels `window` of pictures of `camera` where it stands at the frame, through a pinhole. A
+  /// volume that reaches behind the camera may be anywhere. Cost: some 10^4 boxes projected, and one pass
+  /// over the occupied bricks.
+  DepthBounds(const RenderVolume& volume, const Camera& camera, const PixelBox& window);
 
   /// For rays through the pixel (x, y) and up to one pixel around it, half a voxel to all sides of them
-  /// included. The pixel must be in the camera's window.
+  /// included. The pixel must be in the window.
   const Range& at(int x, int y) const {
     return cells_[std::size_t((y - window_.y0) / kCell) * std::size_t(across_) +
                   std::size_t((x - window_.x0) / kCell)];

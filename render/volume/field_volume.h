@@ -17,7 +17,8 @@ namespace nephele {
 struct FieldVolumeOptions {
   /// Where there may be density, world units; outside there is none.
   Box box;
-  /// Voxels across a pixel, at the place nearest to the camera where the picture shows density.
+  /// Voxels across a pixel, at the place nearest to the camera where the picture, whole if there is a crop,
+  /// shows density.
   float voxelsPerPixel = 1.0f;
   /// Bytes that the bricks may take; voxels grow until they fit.
   double mostBytes = 1e9;

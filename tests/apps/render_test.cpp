@@ -246,15 +246,41 @@ TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
 
 TEST_F(RenderVerb, MakesAPartOfThePictureThatACompositorPlaces) {
   const TemporaryFolder folder;
-  const std::string start = "render " + fog() + " --size 40x30 --quiet -o ";
-  ASSERT_EQ(runProgram(start + folder.file("whole.exr")).exitCode, 0);
-  ASSERT_EQ(runProgram(start + folder.file("part.exr") + " --crop 10,5,31,25").exitCode, 0);
-  const Image whole = readImage(folder.file("whole.exr")), part = readImage(folder.file("part.exr"));
-  EXPECT_EQ(part.display, (Image::Display{10, 5, 40, 30}));
-  ASSERT_EQ(part.width, 21);
-  ASSERT_EQ(part.height, 20);
-  for (int y = 0; y != 20; ++y)
-    for (int x = 0; x != 21; ++x) ASSERT_EQ(part.at("R", x, y), whole.at("R", x + 10, y + 5));
+  writeMesh(folder.file("ball.obj"), icosphere(1, 3));
+  std::ofstream(folder.file("ball.felt")) << "scalarfield density = max(1 - length(identity()), 0);\n"
+                                             "domain bounds = domain((-1, -1, -1), (2, 2, 2), 0.1);\n";
+  // What is looked at between pixels or smoothed over them, and what suits what is seen.
+  const std::string cases[] = {
+      fog(),
+      fog() + " --quality draft --aov Z,normal,light",
+      fog() + " --sky clear:3 --sun 60,20 --aerial-perspective --scale 2km --ground",
+      fog() + " --integrator path --samples 2 --lens-radius 0.05",
+      folder.file("ball.obj") + " --camera-position 2,1,2",
+      folder.file("ball.felt") + " --detail exact --camera-position 0,0.4,1.3",
+  };
+  for (const std::string& options : cases) {
+    const auto pictures = [&](const std::string& name, const std::string& crop) {
+      const ProgramResult result =
+          runProgram("render " + options + " --size 40x30 --light-quality draft --quiet -o " +
+                     folder.file(name + ".exr") + " --preview " + folder.file(name + ".png") + crop);
+      EXPECT_EQ(result.exitCode, 0) << options << ": " << result.errors;
+      return std::pair(readImage(folder.file(name + ".exr")), readImage(folder.file(name + ".png")));
+    };
+    const auto [whole, wholeShown] = pictures("whole", "");
+    const auto [part, partShown] = pictures("part", " --crop 10,5,31,25");
+    EXPECT_EQ(part.display, (Image::Display{10, 5, 40, 30})) << options;
+    const auto expectPart = [&](const Image& found, const Image& of) {
+      ASSERT_EQ(found.width, 21) << options;
+      ASSERT_EQ(found.height, 20) << options;
+      for (const Image::Channel& channel : of.channels)
+        for (int y = 0; y != 20; ++y)
+          for (int x = 0; x != 21; ++x)
+            ASSERT_EQ(found.at(channel.name, x, y), of.at(channel.name, x + 10, y + 5))
+                << options << ": " << channel.name << " at " << x << ", " << y;
+    };
+    expectPart(part, whole);
+    expectPart(partShown, wholeShown);
+  }
 }
 
 // Area of a picture that is covered, and the width of its middle row that is covered somewhat but not quite.

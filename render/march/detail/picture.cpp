@@ -84,7 +84,7 @@ Picture::Picture(const BakedLight& lit, const RenderScene& scene, const RenderOp
   // What deep pictures and holdouts cut is measured by steps, whatever is seen of them.
   if (isDeep_ || holdout_) scene_.mostGrowth = 1, scene_.uniformStep = scene_.step;
   surfaces_ = scene.surfaces;
-  if (!blurred_) bounds_.emplace(*lit.source, camera_);
+  if (!blurred_) bounds_.emplace(*lit.source, camera_, film.reach());
   if ((field_ = lit.source->field())) {
     fieldSteps_.longest = options.step.value_or(0.25f * lit.voxelSize);
     fieldSteps_.pixelAngle = scene_.pixelAngle;

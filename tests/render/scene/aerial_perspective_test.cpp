@@ -94,6 +94,25 @@ TEST(AddAir, DoesWithEveryPixelWhatTheAirBeforeItDoes) {
   EXPECT_EQ(after.at("light_air.R", width - 1, height - 1), 0);
 }
 
+TEST(AddAir, HoldsFromHereToTheHorizon) {
+  constexpr int width = 64, height = 4;
+  Image image = pictureOf(width, height, 1);
+  std::vector<float>& depths = const_cast<Image::Channel*>(image.find("Z_mean"))->values;
+  for (std::size_t i = 0; i != depths.size(); ++i)
+    depths[i] = 0.3f * std::exp2(18.0f * float(i % width) / float(width - 1));
+  const AerialPerspective air{skyAt(15), 1, 1};
+  addAir(image, camera(width, height), air);
+  for (int x = 0; x != width; ++x) {
+    const Ray ray = camera(width, height).ray(x + 0.5, 0.5);
+    const double cosine = dot(ray.direction, camera(width, height).forward());
+    const ClearSky::Air expected =
+        air.sky.airBefore(Vec3f(ray.direction), float(double(depths[std::size_t(x)]) / cosine));
+    EXPECT_NEAR(image.at("light_air.B", x, 0), 0.8f * expected.light.z, 2e-3f * expected.light.z + 1e-6f)
+        << depths[std::size_t(x)];
+    EXPECT_NEAR(image.at("light_sun.B", x, 0), 0.5f * expected.left.z, 2e-3f) << depths[std::size_t(x)];
+  }
+}
+
 TEST(AddAir, RefusesWhatHasNoDepthOrNoLength) {
   Image image = pictureOf(8, 8, 10);
   EXPECT_THROW(addAir(image, camera(8, 8), {skyAt(15), 0}), Error);

@@ -22,7 +22,7 @@ RenderVolume twoBalls() {
 // Depths at which the line of sight through (x, y) is within one of the balls: by steps of a thousandth.
 void expectBounds(const Camera& camera) {
   const RenderVolume volume = twoBalls();
-  const DepthBounds bounds(volume, camera);
+  const DepthBounds bounds(volume, camera, camera.window());
   const PixelBox window = camera.window();
   int met = 0, empty = 0;
   for (int y = window.y0; y < window.y1; ++y)
@@ -65,7 +65,7 @@ TEST(DepthBounds, HoldWhatACropSees) {
 
 TEST(DepthBounds, AreOpenWhereTheVolumeReachesBehindTheCamera) {
   const Camera camera = Camera::lookingAt({-0.5f, 0, 0.3f}, {1, 0, 0}, {0, 1, 0}, {40, 30, 40});
-  const DepthBounds bounds(twoBalls(), camera);
+  const DepthBounds bounds(twoBalls(), camera, camera.window());
   const DepthBounds::Range range = bounds.at(0, 0);
   EXPECT_EQ(range.near, 0);
   EXPECT_TRUE(std::isinf(range.far));
@@ -77,7 +77,7 @@ TEST(DepthBounds, HoldWithCubesInThePlaceOfManyBricks) {
                                               [](const Vec3f&) { return 1.0f; }));
   ASSERT_GT(volume.occupiedBricks().size(), 40000u);
   const Camera camera = Camera::lookingAt({0, 0, 3}, {0, 0, 0}, {0, 1, 0}, {64, 64, 30});
-  const DepthBounds bounds(volume, camera);
+  const DepthBounds bounds(volume, camera, camera.window());
   const DepthBounds::Range range = bounds.at(32, 32);
   EXPECT_LE(range.near, 3.0f - 0.001f);
   EXPECT_GE(range.far, 3.0f);

@@ -89,6 +89,13 @@ TEST(FieldVolume, OnlyWhatThePictureShowsCounts) {
   // If it does not show anything, voxels have the size that suits the box.
   const Camera away = Camera::lookingAt({0, 0, 9}, {0, 0, 20}, {0, 1, 0}, {100, 100, 20});
   EXPECT_FLOAT_EQ(fieldVoxelSize(cotton(), away, around(2)), 4.0f / 64);
+  // Parts of a picture, one of them beside the volume, are of the same voxels.
+  for (const PixelBox& crop : {PixelBox{40, 40, 60, 60}, PixelBox{0, 0, 5, 5}}) {
+    Camera::Frame frame{100, 100, 20};
+    frame.crop = crop;
+    const Camera part = Camera::lookingAt({0, 0, 9}, {0, 0, 0}, {0, 1, 0}, frame);
+    EXPECT_FLOAT_EQ(fieldVoxelSize(cotton(), part, around(10)), alone);
+  }
 }
 
 TEST(FieldVolume, GivesThePictureOfTheField) {
