@@ -235,10 +235,7 @@ LookPicture LookTier::picture(const LookPlan& plan, const LookFrame& frame, Look
     const auto density = volume(plan, finer, run);
     picture = picture.resolved(*density, run);
     plan.scene.addTo(picture, *density, true, run);
-    const PictureStages::Keys keys = plan.keys(tier_);
-    lit =
-        stages_.light(keys.medium, keys.lights,
-                      {picture.medium, picture.lights, picture.render.octaves, picture.render.surfaces}, run);
+    lit = picture.lit(stages_, plan.keys(tier_), run);
   }
   if (frame.samples > 0) picture.render.samples = frame.samples;
   const Camera camera = picture.camera();

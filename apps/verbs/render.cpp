@@ -32,13 +32,11 @@ void bindOptions(CLI::App& app, RenderVerbOptions& options) {
 }
 
 /// Marches or path traces `volume`, which is that of the stages. Light that is made stays with them.
-RenderResult pictureOf(const PictureOptions& picture, const RenderVolume& volume, const Camera& camera,
+RenderResult pictureOf(PictureOptions& picture, const RenderVolume& volume, const Camera& camera,
                        const PictureStages::Keys& keys, PictureStages& stages, Run& run) {
   if (picture.pathTraced) return picture.picture(volume, camera, run);
   const bool isLit = stages.isLit(keys);
-  const auto lit =
-      stages.light(keys.medium, keys.lights,
-                   {picture.medium, picture.lights, picture.render.octaves, picture.render.surfaces}, run);
+  const auto lit = picture.lit(stages, keys, run);
   RenderResult result = lit->light.render(camera, picture.marched(camera), run);
   if (!isLit) result.lightSeconds = lit->light.lightSeconds();
   return result;
@@ -72,7 +70,9 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   run.requireMemory(double(volume->memoryBytes()) + picture.estimateBytes(*volume, camera),
                     "make the picture smaller (--size), or the volume with larger voxels");
   picture.light.writeShadows(*volume, picture.lights, picture.medium, run);
-  if (made && !picture.needsSamples()) made->giveUpSamples();
+  // Other light in the same volume needs what this one does.
+  if (made && !picture.needsSamples() && !(run.pictureStages && picture.lightNeedsSamples(*volume)))
+    made->giveUpSamples();
   LivePicture live(picture.displayServer, files.name(), picture.render);
   RenderResult result = pictureOf(picture, *volume, camera, keys, *stages, run);
   picture.addSky(result.image, camera, picture.lights);

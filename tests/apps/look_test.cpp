@@ -458,6 +458,14 @@ TEST(LookVerb, ShowsAllOfAVolume) {
   EXPECT_EQ(pictureOf(viewer, normal)["type"], "picture");
   const Json point = pictureOf(viewer, settings(3, Json::object(), {{"point", Json::array({"0,3,0,2"})}}));
   EXPECT_EQ(point["type"], "picture") << point;
+  // Another sun on the same ground, and a lamp that has moved.
+  for (const char* sun : {"10,20", "60,30"}) {
+    const Json ground =
+        pictureOf(viewer, settings(3, Json::object(), {{"ground", true}, {"sun", Json::array({sun})}}));
+    EXPECT_EQ(ground["type"], "picture") << ground;
+  }
+  const Json moved = pictureOf(viewer, settings(3, Json::object(), {{"point", Json::array({"0,4,0,2"})}}));
+  EXPECT_EQ(moved["type"], "picture") << moved;
   const Json surface = pictureOf(viewer, shown(settings(4), "surface"));
   ASSERT_EQ(surface["type"], "picture") << surface;
   for (int axis = 0; axis != 3; ++axis) {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -46,6 +47,31 @@ class Wedges : public testing::Test {
 
   TemporaryFolder folder;
 };
+
+// Of the light before, or of the volume that it was made in, nothing may be gone that the next one needs.
+TEST_F(Wedges, LightOneVolumeAgainAsOthersDo) {
+  const std::pair<std::string, std::string> cases[] = {
+      {"--point 1,1,2,3", "extinction 2,5"},
+      {"--spot 1,1,3,0,0,0,30,5,9", "sky 0.1,0.2,0.3;0.3,0.1,0.2"},
+      {"--shadow-detail 2", "sun 10,10;60,40"},
+      {"--temperature-grid density", "sun 10,10;60,40"},
+      {"--ground", "sun 10,10;60,40"},
+      {"--object " + ownData("data/sphere_uv.obj"), "sun 10,10;60,40"},
+  };
+  for (const auto& [options, varied] : cases) {
+    const std::string option = varied.substr(0, varied.find(' ')), values = varied.substr(option.size() + 1);
+    const char between = values.find(';') != values.npos ? ';' : ',';
+    succeeds(rendering(fmt::format("{} --wedge '{}={}'", options, option, values)));
+    const std::string last = values.substr(values.find(between) + 1);
+    std::string label = last;
+    std::ranges::replace(label, ',', '_');
+    succeeds(rendering(fmt::format("{} --{} {}", options, option, last)));
+    const Image alone = readImage(file("r.exr")),
+                one = readImage(file(fmt::format("r.{}_{}.exr", option, label)));
+    for (const Image::Channel& channel : alone.channels)
+      EXPECT_EQ(channel.values, one.channel(channel.name).values) << options << ' ' << channel.name;
+  }
+}
 
 TEST_F(Wedges, MakeOneOutputForEachValue) {
   succeeds(cloud("--wedge seed=1-3"));

@@ -214,6 +214,18 @@ bool PictureOptions::needsSamples() const {
   return pathTraced || std::ranges::count(render.aovs, "normal") > 0;
 }
 
+bool PictureOptions::lightNeedsSamples(const RenderVolume& volume) const {
+  return !light.readsCodes() || volume.hasEmission();
+}
+
+std::shared_ptr<const LitCloud> PictureOptions::lit(PictureStages& stages, const PictureStages::Keys& keys,
+                                                    const Progress& progress) {
+  auto result =
+      stages.light(keys.medium, keys.lights, {medium, lights, render.octaves, render.surfaces}, progress);
+  render.surfaces = result->light.surfaces();
+  return result;
+}
+
 RenderOptions PictureOptions::marched(const Camera& camera) const {
   RenderOptions options = render;
   if (!samplesGiven && (camera.hasLens() || camera.isMoving() || render.volumeMotion))

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "nephele/render/image/display_server.h"
 #include "nephele/render/march/path_trace.h"
 #include "nephele/render/march/raymarch.h"
+#include "nephele/render/session/picture_stages.h"
 #include "nephele/render/volume/render_volume.h"
 
 namespace nephele::apps {
@@ -64,12 +66,18 @@ struct PictureOptions : CameraOptions {
   bool needsSamples() const;
   /// Whether a density that is coded is enough for all of it.
   bool readsCodes() const { return !needsSamples() && light.readsCodes(); }
+  /// Whether light that is made in `volume` reads its samples.
+  bool lightNeedsSamples(const RenderVolume& volume) const;
   /// `render` with the rays per pixel that suit `camera`, unless they were given.
   RenderOptions marched(const Camera& camera) const;
   /// `path`, with what both integrators have in common.
   PathOptions traced() const;
   /// That a picture will hold beside the volume, at most.
   double estimateBytes(const RenderVolume& volume, const Camera& camera) const;
+  /// The volume of `stages` in these lights, whose objects it takes over: light of which only suns are new
+  /// has those of the light before. `resolved` comes first.
+  std::shared_ptr<const LitCloud> lit(PictureStages& stages, const PictureStages::Keys& keys,
+                                      const Progress& progress);
   /// Marches or path traces; `resolved` comes first.
   RenderResult picture(const RenderVolume& volume, const Camera& camera, const Progress& progress) const;
   /// Puts the air before a picture that was made in these lights, and the backdrop behind it, where they are
