@@ -92,7 +92,8 @@ void ScatteredLight::Sender::send(std::span<const ScatteredLight* const> lights,
         [&](std::size_t i, float itsOwn, float ofBeam) {
           met[i].values[0] = any.density_[i];
           const float goesOn = 1 - any.share_[i];
-          met[i].values[1 + k] = itsOwn + (goesOn > 0 ? (1 - lights[k]->smoothShare_) / goesOn * ofBeam : 0.0f);
+          met[i].values[1 + k] =
+              itsOwn + (goesOn > 0 ? (1 - lights[k]->smoothShare_) / goesOn * ofBeam : 0.0f);
         }));
   for (std::vector<float>* values : sent) values->resize(cells);
   const float leastShare = *std::ranges::min_element(any.share_);
