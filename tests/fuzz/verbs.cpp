@@ -8,6 +8,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 #include <map>
 
@@ -185,6 +186,41 @@ bool has(const std::vector<std::string>& arguments, std::string_view option) {
       arguments, [&](const std::string& each) { return each.substr(0, each.find('=')) == option; });
 }
 
+bool hasAny(const std::vector<std::string>& arguments, std::initializer_list<std::string_view> options) {
+  return std::ranges::any_of(options, [&](std::string_view option) { return has(arguments, option); });
+}
+
+std::vector<std::string> with(std::vector<std::string> arguments, std::initializer_list<std::string> more) {
+  arguments.insert(arguments.end(), more);
+  return arguments;
+}
+
+/// `part` is what `whole` is from this pixel on.
+void expectPart(const Image& part, const Image& whole, int x0, int y0, const std::string& what) {
+  for (const Image::Channel& channel : part.channels)
+    for (int y = 0; y != part.height; ++y)
+      for (int x = 0; x != part.width; ++x)
+        if (part.at(channel.name, x, y) != whole.at(channel.name, x0 + x, y0 + y))
+          fail(fmt::format("{}: {} differs at {}, {}", what, channel.name, x, y));
+}
+
+/// A part of a picture is that of the whole, as which `arguments` have written out.exr.
+void checkCrop(const std::vector<std::string>& arguments) {
+  const Image whole = readImage("out.exr");
+  const int x0 = whole.width / 3, y0 = whole.height / 2, x1 = std::max(whole.width - 1, x0 + 1);
+  const std::string crop = fmt::format("{},{},{},{}", x0, y0, x1, whole.height);
+  if (run("render", with(arguments, {"--crop", crop})) == Outcome::stopped) return;
+  expectPart(readImage("out.exr"), whole, x0, y0, "--crop " + crop);
+}
+
+/// A picture whose volume has been lit by another sun before is that of a call of its own.
+void checkWedge(const std::vector<std::string>& arguments) {
+  if (run("render", with(arguments, {"--sun", "60,40"})) != Outcome::done) return;
+  const Image alone = readImage("out.exr");
+  if (run("render", with(arguments, {"--wedge", "sun=10,20;60,40"})) == Outcome::stopped) return;
+  expectPart(readImage("out.sun_60_40.exr"), alone, 0, 0, "--wedge");
+}
+
 }  // namespace
 
 std::span<const std::string_view> verbFiles() {
@@ -243,14 +279,18 @@ bool useVerb(const Input& input) {
   const auto outputs = workplace.outputs();
   if (outcome != Outcome::done) {
     // Of several calls those that are whole stay, and so does what other calls may use.
-    if (!has(given, "--frames") && !has(given, "--wedge") && !has(given, "--cache") && verb != "turntable")
+    if (!hasAny(given, {"--frames", "--wedge", "--cache"}) && verb != "turntable")
       expect(outputs.empty(), fmt::format("{} was left of a verb that failed: {}",
                                           outputs.empty() ? "" : outputs.begin()->first, lastError()));
     return false;
   }
   for (const auto& [name, path] : outputs) checkOutput(verb, name, path);
 
-  if (input.hash % 8 != 0 || has(given, "--stats") || has(given, "--cache")) return true;
+  if (verb == "render" && !hasAny(given, {"--crop", "--frames", "--wedge", "--stats", "--skip-existing"})) {
+    if (input.hash % 8 == 1) checkCrop(arguments);
+    if (input.hash % 8 == 2 && !has(given, "--sun")) checkWedge(arguments);
+  }
+  if (input.hash % 8 != 0 || hasAny(given, {"--stats", "--cache"})) return true;
   std::map<std::string, std::string> before;
   for (const auto& [name, path] : outputs) before[name] = contentsOf(path);
   workplace.restore();
