@@ -321,6 +321,16 @@ class Sessions(Case):
         self.assertEqual(lights, [True, False, False, True, False, True])
         self.assertEqual(reads, [True, False, False, False, False, False])
 
+    def test_light_volumes_again_that_have_lamps_a_ground_or_a_glow(self):
+        fog = fog_grid()
+        session = nephele.Session(fog)
+        lamp = dict(point="0,2,2,3")
+        glow = dict(temperature_grid="density")
+        for change in (lamp, dict(lamp, extinction=7), dict(point="1,2,2,3"), glow, dict(glow, sun=(10, 20, 3)), dict(ground=True),
+                       dict(ground=True, sun=(10, 20, 3)), {}):
+            wanted = nephele.render(fog, **dict(self.SMALL, **change))
+            np.testing.assert_array_equal(session.render(**dict(self.SMALL, **change)).array, wanted.array)
+
     def test_see_objects_as_they_were_and_name_them(self):
         fog = fog_grid()
         wanted = nephele.render(fog, **self.SMALL)
