@@ -32,6 +32,8 @@ namespace fs = std::filesystem;
 /// Seconds of a processor after which a verb is stopped, and within which it must be back then: the program
 /// promises a fifth of a second, of which the sanitizers make several.
 constexpr double kStopAfter = 2, kMostToStop = 6;
+/// What takes longer is not done again in other ways.
+constexpr double kQuick = 0.5;
 
 double processorSeconds() {
   return double(std::clock()) / CLOCKS_PER_SEC;
@@ -275,7 +277,9 @@ bool useVerb(const Input& input) {
   static const Workplace workplace;
   workplace.restore();
   const std::string verb(call->verb);
+  const double start = processorSeconds();
   const Outcome outcome = run(verb, arguments);
+  const bool isQuick = processorSeconds() - start < kQuick;
   const auto outputs = workplace.outputs();
   if (outcome != Outcome::done) {
     // Of several calls those that are whole stay, and so does what other calls may use.
@@ -286,7 +290,8 @@ bool useVerb(const Input& input) {
   }
   for (const auto& [name, path] : outputs) checkOutput(verb, name, path);
 
-  if (verb == "render" && !hasAny(given, {"--crop", "--frames", "--wedge", "--stats", "--skip-existing"})) {
+  if (verb == "render" && isQuick &&
+      !hasAny(given, {"--crop", "--frames", "--wedge", "--stats", "--skip-existing"})) {
     if (input.hash % 8 == 1) checkCrop(arguments);
     if (input.hash % 8 == 2 && !has(given, "--sun")) checkWedge(arguments);
   }
