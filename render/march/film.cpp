@@ -25,7 +25,7 @@ std::size_t Film::channelCount(const std::vector<std::string>& layers, std::size
 
 Film::Film(const Camera& camera, const std::vector<std::string>& lights,
            const std::vector<std::string>& layers)
-    : Film(camera.window(), {0, 0, camera.width(), camera.height()}, lights, layers) {}
+    : Film(camera.window(), camera.picture(), lights, layers) {}
 
 Film::Film(const PixelBox& window, const PixelBox& picture, const std::vector<std::string>& lights,
            const std::vector<std::string>& layers)

@@ -288,8 +288,7 @@ Image pictureSurfaces(const Surfaces& surfaces, const Camera& camera, int sample
       length(beside.origin - ahead.origin)};
 
   // What smoothing mixes into the pixels of a part is the same as in the whole.
-  const PixelBox window = camera.window(),
-                 seen = window.grownBy(kSmoothReach).sharedWith({0, 0, camera.width(), camera.height()});
+  const PixelBox window = camera.window(), seen = window.grownBy(kSmoothReach).sharedWith(camera.picture());
   const auto width = std::size_t(seen.width()), height = std::size_t(seen.height());
   std::vector<Seen> pixels(width * height);
   parallelFor(

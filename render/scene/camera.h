@@ -91,7 +91,9 @@ class Camera {
   int width() const { return frame_.width; }
   int height() const { return frame_.height; }
   /// The pixels to be rendered: the crop, or the whole picture.
-  PixelBox window() const { return frame_.crop.value_or(PixelBox{0, 0, frame_.width, frame_.height}); }
+  PixelBox window() const { return frame_.crop.value_or(picture()); }
+  /// All pixels, whatever the crop.
+  PixelBox picture() const { return {0, 0, frame_.width, frame_.height}; }
   bool isOrthographic() const { return frame_.projection == Projection::orthographic; }
   bool hasLens() const;
   bool isMoving() const { return !shutter_.empty(); }

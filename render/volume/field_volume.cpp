@@ -41,7 +41,7 @@ constexpr float kVelocityChecks = 32;
 // The smallest width that a pixel has in the part of `box` that the picture may show; infinite where it shows
 // none of it. The whole picture, so that its parts are of the same volume.
 double narrowestPixel(const Camera& camera, const Box& box) {
-  const PixelBox window{0, 0, camera.width(), camera.height()};
+  const PixelBox window = camera.picture();
   double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
   double low[2] = {nearest, nearest}, high[2] = {farthest, farthest};
   for (int corner = 0; corner != 8; ++corner) {
