@@ -8,6 +8,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <set>
+#include <string>
+#include <utility>
 
 #include "nephele/levelset/io/detail/mesh_io_private.h"
 
@@ -31,10 +34,23 @@ bool isSingleValued(const Mesh& mesh, const MeshAttribute& attribute, std::vecto
   return true;
 }
 
-std::string plyName(std::string name) {
-  for (char& c : name) c = c > ' ' && c <= '~' ? c : '_';
-  return name.empty() ? "unnamed" : name;
-}
+// Names of the properties of one element, each a word. Of two of the same name readers keep one, or mix them
+// up.
+class PropertyNames {
+ public:
+  explicit PropertyNames(std::set<std::string> taken) : taken_(std::move(taken)) {}
+
+  std::string add(std::string name) {
+    for (char& c : name) c = c > ' ' && c <= '~' ? c : '_';
+    if (name.empty()) name = "unnamed";
+    std::string unique = name;
+    for (int k = 2; !taken_.insert(unique).second; ++k) unique = fmt::format("{}_{}", name, k);
+    return unique;
+  }
+
+ private:
+  std::set<std::string> taken_;
+};
 
 // One list of the faces: components first .. first + count - 1 of a corner attribute.
 struct FaceList {
@@ -46,16 +62,15 @@ struct FaceList {
 // Colours as MeshLab has those of wedges, three per corner; it would misread four.
 std::vector<FaceList> faceLists(const Mesh& mesh, const MeshAttribute* uv, bool uvPerVertex) {
   std::vector<FaceList> lists;
+  PropertyNames names({"vertex_indices", "vertex_index", "texcoord"});
   if (uv && !uvPerVertex) lists.push_back({"texcoord", uv, 0, 2});
   for (const MeshAttribute& a : mesh.attributes) {
     if (a.domain != MeshAttribute::Domain::corner || &a == uv || a.width < 1) continue;
-    std::string name = plyName(a.name);
-    if (name == "texcoord" || name == "vertex_indices" || name == "vertex_index") name += "_corner";
-    if (name == "color" && a.width == 4) {
-      lists.push_back({"color", &a, 0, 3});
-      lists.push_back({"alpha", &a, 3, 1});
+    if (a.name == "color" && a.width == 4) {
+      lists.push_back({names.add("color"), &a, 0, 3});
+      lists.push_back({names.add("alpha"), &a, 3, 1});
     } else {
-      lists.push_back({name, &a, 0, static_cast<std::size_t>(a.width)});
+      lists.push_back({names.add(a.name), &a, 0, static_cast<std::size_t>(a.width)});
     }
   }
   return lists;
@@ -114,15 +129,18 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
   ByteWriter out(stream);
   out.text("ply\nformat binary_little_endian 1.0\n");
   out.text(fmt::format("element vertex {}\n", mesh.positions.size()));
+  PropertyNames names({});
   for (const char* axis : {"x", "y", "z"})
-    out.text(fmt::format("property {} {}\n", fitsFloat ? "float" : "double", axis));
+    out.text(fmt::format("property {} {}\n", fitsFloat ? "float" : "double", names.add(axis)));
   static constexpr const char* kChannels[] = {"red", "green", "blue", "alpha"};
-  for (int k = 0; color && k < color->width; ++k) out.text(fmt::format("property uchar {}\n", kChannels[k]));
-  if (uvPerVertex) out.text("property float s\nproperty float t\n");
+  for (int k = 0; color && k < color->width; ++k)
+    out.text(fmt::format("property uchar {}\n", names.add(kChannels[k])));
+  for (const char* coordinate : {"s", "t"})
+    if (uvPerVertex) out.text(fmt::format("property float {}\n", names.add(coordinate)));
   for (const MeshAttribute* a : others)
     for (int k = 0; k < a->width; ++k)
-      out.text(a->width == 1 ? fmt::format("property float {}\n", plyName(a->name))
-                             : fmt::format("property float {}_{}\n", plyName(a->name), k));
+      out.text(fmt::format("property float {}\n",
+                           names.add(a->width == 1 ? a->name : fmt::format("{}_{}", a->name, k))));
   out.text(fmt::format("element face {}\nproperty list {} {} vertex_indices\n", mesh.faceCount(),
                        mostCorners < 256 ? "uchar" : "uint",
                        mesh.positions.size() < 0x80000000u ? "int" : "uint"));

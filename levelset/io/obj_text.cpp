@@ -15,9 +15,10 @@
 namespace nephele::detail {
 namespace {
 
-// A name on one line, as statements need.
+// A name on one line, as statements need, which a backslash at its end would join with the next.
 std::string oneLine(std::string name) {
   for (char& c : name) c = c == '\n' || c == '\r' ? ' ' : c;
+  if (name.ends_with('\\')) name += ' ';
   return name;
 }
 

@@ -180,7 +180,8 @@ struct SmoothstepOp {
   HWY_INLINE V chain(V a, V, V g) const {
     const V t = parameter(a);
     const V slope = hn::Mul(hn::Mul(hn::Mul(constant(6), t), hn::Sub(constant(1), t)), scale);
-    return hn::Mul(slope, g);
+    // Where it is flat, so for an `a` that is no number, a derivative that is none either counts nothing.
+    return hn::IfThenElseZero(hn::Ne(slope, hn::Zero(D())), hn::Mul(slope, g));
   }
 };
 

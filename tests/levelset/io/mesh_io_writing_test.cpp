@@ -149,6 +149,40 @@ TEST(MeshIo, PlyRoundTripKeepsEveryAttributeOfCorners) {
   }
 }
 
+TEST(MeshIo, PlyHasNoTwoPropertiesOfOneName) {
+  const TemporaryFolder folder;
+  Mesh mesh = decorated();
+  const std::size_t vertices = mesh.positions.size();
+  for (const char* name : {"a b", "a_b", "x", "red", "a b"})
+    mesh.attributes.push_back({name, MeshAttribute::Domain::vertex, 1,
+                               std::vector<float>(vertices, float(mesh.attributes.size()))});
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(back.positions, mesh.positions);
+  EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values);
+  std::size_t k = mesh.attributes.size() - 5;
+  for (const char* name : {"a_b", "a_b_2", "x_2", "red_2", "a_b_3"}) {
+    const MeshAttribute* attribute = find(back, name);
+    ASSERT_NE(attribute, nullptr) << name;
+    EXPECT_EQ(attribute->values, mesh.attributes[k++].values) << name;
+  }
+}
+
+TEST(MeshIo, ObjKeepsFacesAfterNamesThatEndInBackslashes) {
+  const TemporaryFolder folder;
+  Mesh mesh = decorated();
+  mesh.groups[0].name = "\\";
+  mesh.groups[1].name = "stone\\";
+  writeMesh(folder.file("a.obj"), mesh);
+  EXPECT_EQ(test::textOf(folder.file("a.obj")).find("\\\n"), std::string::npos)
+      << "which joins two lines, for any reader";
+  const Mesh back = readMesh(folder.file("a.obj"));
+  EXPECT_EQ(back.corners, mesh.corners);
+  ASSERT_EQ(back.groups.size(), 2u);
+  EXPECT_EQ(back.groups[0].name, "\\");
+  EXPECT_EQ(back.groups[1].name, "stone\\");
+}
+
 TEST(MeshIo, PlyHasColoursOfCornersAsMeshLabHasThem) {
   // As VCGlib's importer and exporter do: a list "color" of three floats per corner; opacity beside it.
   const TemporaryFolder folder;

@@ -294,6 +294,9 @@ TEST(FieldOps, CarriesNonFiniteValuesThrough) {
   EXPECT_EQ(clamp(sqrt(kX), 2, 3)({-1, 0, 0}), 2);
   EXPECT_EQ(sqrt(kX).range(kBox), Interval::everything());
   EXPECT_EQ(min(sqrt(kX), 5)({-1, 0, 0}), 5);
+  for (const ScalarField& held : {clamp(sqrt(kX), 2, 3), min(sqrt(kX), 5), mask(sqrt(kX)),
+                                  mask(sqrt(kX), 0.1f), smoothstep(0, 1, sqrt(kX))})
+    EXPECT_EQ(grad(held)({-1, 0, 0}), Vec3f(0, 0, 0)) << "where the value is no longer that of the root";
 }
 
 TEST(FieldOps, RefusesArgumentsOutsideTheirRange) {
