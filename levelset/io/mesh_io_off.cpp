@@ -69,17 +69,22 @@ Mesh readOff(const MeshFile& file) {
     mesh.positions.emplace_back(x, y, scanner.number("a coordinate"));
     for (int k = 0; hasNormals && k < 3; ++k) scanner.number("a normal");
     if (hasColors) {
-      float rgba[4] = {};
+      // Texture coordinates are the last two of a line; a colour of three values or four stands before them.
+      const char* what = hasUvs ? "a colour or texture coordinate" : "a colour";
+      const std::size_t behind = hasUvs ? 2 : 0;
+      float values[6] = {};
       std::size_t count = 0;
-      const std::size_t most = hasUvs ? 3 : 4;
-      while (count < most && !scanner.atLineEnd()) rgba[count++] = scanner.single("a colour");
-      if (count < 3) scanner.fail(fmt::format("a colour needs 3 or 4 values, this one has {}", count));
-      if (colorWidth == 0) colorWidth = count;
-      if (count != colorWidth)
-        scanner.fail(fmt::format("a colour of {} values after colours of {}", count, colorWidth));
-      colors.insert(colors.end(), rgba, rgba + count);
+      while (count < 4 + behind && !scanner.atLineEnd()) values[count++] = scanner.single(what);
+      const std::size_t width = count < behind ? 0 : count - behind;
+      if (width < 3) scanner.fail(fmt::format("a colour needs 3 or 4 values, this one has {}", width));
+      if (colorWidth == 0) colorWidth = width;
+      if (width != colorWidth)
+        scanner.fail(fmt::format("a colour of {} values after colours of {}", width, colorWidth));
+      colors.insert(colors.end(), values, values + width);
+      uvs.insert(uvs.end(), values + width, values + count);
+    } else {
+      for (int k = 0; hasUvs && k < 2; ++k) uvs.push_back(scanner.single("a texture coordinate"));
     }
-    for (int k = 0; hasUvs && k < 2; ++k) uvs.push_back(scanner.single("a texture coordinate"));
     scanner.nextLine();
   }
 

@@ -301,6 +301,19 @@ TEST(MeshIo, OffKnowsColoursNormalsCommentsAndCountsBehindTheWord) {
   EXPECT_EQ(find(mesh, "color")->values, (std::vector<float>{1, 0, 0, 0, 0.2f, 0, 0, 0, 0}));
 }
 
+TEST(MeshIo, OffHasTextureCoordinatesBehindColoursOfThreeValuesOrFour) {
+  // The order of Geomview's manual (OOGL, OFF): normals, colours, texture coordinates.
+  for (const std::string opacity : {"", " 0.25"}) {
+    const Mesh mesh =
+        readText("a.off", "STCNOFF 3 1 0\n0 0 0 0 0 1 1 0.5 0" + opacity + " 0.75 0.125\n1 0 0 0 0 1 0 1 0" +
+                              opacity + " 2 3\n0 1 0 0 0 1 0 0 1" + opacity + " 4 5\n3 2 0 1\n");
+    EXPECT_EQ(find(mesh, "uv")->values, (std::vector<float>{4, 5, 0.75f, 0.125f, 2, 3}));
+    EXPECT_EQ(find(mesh, "color")->values,
+              opacity.empty() ? (std::vector<float>{1, 0.5f, 0, 0, 1, 0, 0, 0, 1})
+                              : (std::vector<float>{1, 0.5f, 0, 0.25f, 0, 1, 0, 0.25f, 0, 0, 1, 0.25f}));
+  }
+}
+
 TEST(MeshIo, GltfAppliesNodesFlipsVAndTurnsMirroredFaces) {
   // One triangle (0,0,0) (1,0,0) (0,1,0) with coordinates (0,0) (1,0) (0,0.25) in a base64 buffer, under a
   // parent that moves by (10, 0, 0) and a child that scales by (-2, 1, 1). The buffer was made with Python's
