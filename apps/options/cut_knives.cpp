@@ -4,11 +4,8 @@
 #include "apps/options/cut_options.h"
 #include "apps/options/expression_names.h"
 #include "nephele/levelset/cut/cut_input.h"
-#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/io/point_io.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
-#include "nephele/modeling/shape/combinations.h"
-#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele::apps {
 namespace {
@@ -19,15 +16,9 @@ std::string planeText(const BladePlane& plane) {
 }
 
 /// The part of space around `box` where `blade` is positive, as a closed mesh.
-Mesh solidOf(const ScalarField& blade, const std::string& text, const Box& box, double voxelSize, Run& run) {
-  const auto voxel = float(voxelSize);
-  // Its walls stand outside of what is cut.
-  const Box room = box.expanded(0.05f * box.longestSide() + 4 * voxel);
-  const ScalarField solid = intersection(blade, nephele::box(room));
-  const Mesh mesh = marchingCubes(
-      *bakeGrid(solid, {.voxelSize = voxel, .box = room.expanded(2 * voxel), .band = {-3 * voxel, 3 * voxel}},
-                run),
-      0.0f, run);
+Mesh solidOf(const ScalarField& blade, const std::string& text, const Box& box, double voxelSize, float kerf,
+             Run& run) {
+  const Mesh mesh = marchingCubes(*sampledBlade(blade, box, voxelSize, kerf, run), 0.0f, run);
   if (mesh.faceCount() == 0)
     throw Error(
         fmt::format("--knife: '{}' is negative everywhere in the shape's box: it has no blade there", text));
@@ -75,6 +66,7 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     result.names.push_back("file " + path);
     knives.solids.push_back(readSolid(path, a.repair, run));
   }
+  result.options.kerf = float(a.kerf.worldUnits(side));
   result.voxelSize = a.voxelSize.value > 0 ? a.voxelSize.worldUnits(side) : side / a.resolution;
   if (a.voxelSize.value == 0 && a.resolutionOption->count() == 0 && parts[0].level)
     result.voxelSize = double(parts[0].level->voxelSize());
@@ -85,7 +77,7 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     const ScalarField blade =
         evaluated("--knife", text.substr(1), {felt::Kind::scalarField}, namesOfPlace(0, a.seed), side)
             .as<ScalarField>();
-    knives.solids.push_back(solidOf(blade, text, box, result.voxelSize, run));
+    knives.solids.push_back(solidOf(blade, text, box, result.voxelSize, result.options.kerf, run));
   }
   if (a.cellCount > 0) {
     run.begin("scatter");
@@ -100,7 +92,6 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     for (const Vec3d& p : readPoints(a.points).positions) knives.cells.emplace_back(p);
   if (result.names.empty() && knives.cells.empty())
     throw CLI::ValidationError("no knife", "give --plane, --random-planes, --knife, --voronoi or --points");
-  result.options.kerf = float(a.kerf.worldUnits(side));
   if (a.minVolume) {
     double whole = 0;
     for (const CutPart& part : parts) whole += signedVolume(part.mesh);

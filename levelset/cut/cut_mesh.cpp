@@ -29,7 +29,7 @@ Pieces cutIntoMeshes(const Mesh& mesh, const Knives& knives, const CutOptions& o
     std::iota(parts[0].triangles.begin(), parts[0].triangles.end(), 0u);
   } else {
     progress.begin("knives");
-    auto sheets = detail::knifeSheets(knives, options.kerf, source);
+    auto sheets = detail::knifeSheets(knives, options.kerf, source, progress);
     if (hasRoughCells) sheets.push_back(detail::cellWalls(knives, source, progress));
     detail::Carved carved = detail::carve(source.positions(), source.triangles(), sheets, progress);
     parts = std::move(carved.parts);

@@ -1,6 +1,9 @@
 #include "nephele/levelset/cut/knives.h"
 
+#include "nephele/levelset/grid/bake.h"
 #include "nephele/levelset/mesh/mesh_distance.h"
+#include "nephele/modeling/shape/combinations.h"
+#include "nephele/modeling/shape/shapes.h"
 
 namespace nephele {
 
@@ -8,6 +11,17 @@ Knife solidKnife(const Mesh& solid, double voxelSize, float kerf, const Progress
   const double band = 0.5 * double(kerf) + 4 * voxelSize;
   return {
       meshDistance(solid, {.voxelSize = voxelSize, .exteriorBand = band, .interiorBand = band}, progress)};
+}
+
+std::shared_ptr<BrickGrid> sampledBlade(const ScalarField& field, const Box& box, double voxelSize,
+                                        float kerf, const Progress& progress) {
+  const auto voxel = float(voxelSize);
+  // The walls of the inner side stand half the kerf further in than those of the field.
+  const Box room = box.expanded(0.05f * box.longestSide() + 4 * voxel + 0.5f * kerf);
+  const float band = 0.5f * kerf + 3 * voxel;
+  return bakeGrid(intersection(field, nephele::box(room)),
+                  {.voxelSize = voxel, .box = room.expanded(0.5f * kerf + 2 * voxel), .band = {-band, band}},
+                  progress);
 }
 
 std::vector<Knife> asFields(const Knives& knives, double voxelSize, float kerf, const Progress& progress) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "nephele/levelset/grid/brick_grid.h"
 #include "nephele/modeling/base/mesh.h"
 #include "nephele/modeling/base/progress.h"
 #include "nephele/modeling/shape/knives.h"
@@ -41,6 +43,12 @@ struct Knives {
 /// The inside of a closed mesh as a knife for level sets of that voxel size: its signed distance as far as a
 /// cut of that width needs it. @throws Error as `meshDistance`.
 Knife solidKnife(const Mesh& solid, double voxelSize, float kerf, const Progress& progress = silent());
+
+/// Samples of a field in a box and around it, whose inside is a knife for meshes: `marchingCubes` of them
+/// gives a closed mesh at 0, and the sides of a kerf at -kerf / 2 and kerf / 2 where the field is a distance.
+/// The walls that close it stand outside of the box. @throws Error as `bakeGrid`; Cancelled.
+std::shared_ptr<BrickGrid> sampledBlade(const ScalarField& field, const Box& box, double voxelSize,
+                                        float kerf, const Progress& progress = silent());
 
 /// All but the cells as fields for a level set of that voxel size, in the order of the signs. Of equal solids
 /// there is one field. @throws Error as `flatKnife`, `roughKnife` and `solidKnife`; Cancelled.

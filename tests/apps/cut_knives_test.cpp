@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "tests/apps/cut_verb.h"
 #include "tests/support/mesh_topology.h"
@@ -157,6 +158,16 @@ TEST_F(CutVerb, AKerfTakesItsWidthTimesTheAreaAway) {
     // 0.1 x 2 x 2, within the 1 % that kerfs must hold.
     EXPECT_NEAR(8 - double(stats()["volume_sum"]), 0.4, 0.004 + (geometry == "exact" ? 0 : 0.01)) << geometry;
     EXPECT_NEAR(list()["kerf"], 0.1, 1e-7);
+  }
+  // Half of a shell about the middle of a face, from 0.45 to 0.55.
+  const std::string knife = meshFile("knife.ply", icosphere(0.5, 4, {1, 0, 0}));
+  ASSERT_EQ(runProgram("levelset " + knife + " -o " + file("knife.vdb") + " --resolution 60").exitCode, 0);
+  const double gone = 2.0 / 3 * std::numbers::pi * (std::pow(0.55, 3) - std::pow(0.45, 3));
+  for (const std::string& with :
+       {knife, file("knife.vdb"), std::string("\"=0.5 - length(P - (1,0,0))\" --resolution 64")}) {
+    cut(box() + " --kerf 0.1 --knife " + with);
+    ASSERT_EQ(stats()["pieces"].size(), 2u) << with;
+    EXPECT_NEAR(8 - double(stats()["volume_sum"]), gone, 0.01 * gone) << with;
   }
 }
 

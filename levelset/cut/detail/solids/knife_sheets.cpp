@@ -4,7 +4,8 @@
 // lie on the plane, and raises them. Its sides are raised by half the kerf times the secant of the
 // slope, so that what goes has the width of the kerf across the blade: K / |grad K| = +- kerf / 2. A solid's
 // sides move its vertices so that the faces around each come to lie at half the kerf, in the sense of least
-// squares.
+// squares. Where that folds them over, as in creases and of small triangles, they are surfaces of the
+// solid's distance instead, from samples.
 #include "nephele/levelset/cut/detail/solids/knife_sheets.h"
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <memory>
 
 #include "nephele/levelset/cut/detail/solids/cut_source.h"
+#include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "nephele/levelset/mesh/winding_number.h"
 #include "nephele/modeling/base/error.h"
@@ -247,8 +249,7 @@ Vec3d jointNormal(std::span<const std::pair<Vec3d, double>> normals) {
 }
 
 /// A closed mesh with its vertices moved so that its faces come to lie `distance` further out.
-std::vector<Vec3d> movedOut(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles,
-                            double distance) {
+Mesh movedOut(std::span<const Vec3d> positions, std::span<const TriangleIndices> triangles, double distance) {
   std::vector<std::vector<std::pair<Vec3d, double>>> fans(positions.size());
   for (const TriangleIndices& t : triangles) {
     const Vec3d n = normalize(cross(positions[t[1]] - positions[t[0]], positions[t[2]] - positions[t[0]]));
@@ -259,10 +260,33 @@ std::vector<Vec3d> movedOut(std::span<const Vec3d> positions, std::span<const Tr
       if (angle > 0) fans[t[k]].emplace_back(n, angle);
     }
   }
-  std::vector<Vec3d> moved(positions.begin(), positions.end());
-  for (std::size_t v = 0; v < moved.size(); ++v)
-    if (!fans[v].empty()) moved[v] += jointNormal(fans[v]) * distance;
+  Mesh moved;
+  moved.positions.assign(positions.begin(), positions.end());
+  for (std::size_t v = 0; v < fans.size(); ++v)
+    if (!fans[v].empty()) moved.positions[v] += jointNormal(fans[v]) * distance;
+  for (const TriangleIndices& t : triangles) moved.addFace(t);
   return moved;
+}
+
+/// True if the triangles of `moved` turned over on their way from `positions`, or cross each other.
+bool isFolded(const Mesh& moved, std::span<const Vec3d> positions) {
+  const auto normalOf = [&](std::span<const std::uint32_t> face, std::span<const Vec3d> at) {
+    return cross(at[face[1]] - at[face[0]], at[face[2]] - at[face[0]]);
+  };
+  for (std::size_t f = 0; f < moved.faceCount(); ++f)
+    if (dot(normalOf(moved.face(f), positions), normalOf(moved.face(f), moved.positions)) < 0) return true;
+  return signedVolume(moved) <= 0 || countSelfIntersections(moved).value_or(0) != 0;
+}
+
+/// The sides of a solid as surfaces of its distance, in and around what is cut.
+std::array<Mesh, 2> sampledSides(const Mesh& blade, float kerf, const CutSource& solid,
+                                 const Progress& progress) {
+  constexpr double kVoxels = 256;
+  const Box box{Vec3f(solid.low()), Vec3f(solid.high())};
+  const double voxel = double(box.longestSide()) / kVoxels;
+  const auto grid =
+      sampledBlade(solidKnife(triangulated(blade), voxel, kerf, progress).field, box, voxel, kerf, progress);
+  return {marchingCubes(*grid, -0.5f * kerf, progress), marchingCubes(*grid, 0.5f * kerf, progress)};
 }
 
 KnifeSheet sheetOf(std::vector<Vec3d> positions, std::vector<TriangleIndices> triangles,
@@ -305,7 +329,8 @@ double roughSpacing(const RoughnessOptions& roughness, double size) {
   return std::clamp(shortest / kPointsPerWave, size / kFinest, size / 8);
 }
 
-std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid) {
+std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid,
+                                    const Progress& progress) {
   const double half = double(kerf) / 2;
   const std::size_t perKnife = half == 0 ? 1 : 2;
   std::vector<KnifeSheet> sheets(perKnife * knives.rough.size());
@@ -334,14 +359,16 @@ std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutS
       continue;
     }
     // The positive side is inside, so what is further out comes first.
-    for (const double distance : {half, -half}) {
-      const std::vector<Vec3d> moved = movedOut(positions, triangles, distance);
-      Mesh mesh;
-      mesh.positions = moved;
-      for (const TriangleIndices& t : triangles) mesh.addFace(t);
-      require(signedVolume(mesh) > 0 && countSelfIntersections(mesh).value_or(0) == 0,
-              fmt::format("cut: a kerf of {} is too wide for {}: its sides cross themselves", kerf, name));
-      sheets.push_back(sheetOf(moved, triangles, name, knife));
+    std::array<Mesh, 2> sides{movedOut(positions, triangles, half), movedOut(positions, triangles, -half)};
+    if (isFolded(sides[0], positions) || isFolded(sides[1], positions))
+      sides = sampledSides(knives.solids[k], kerf, solid, progress);
+    for (Mesh& side : sides) {
+      std::vector<TriangleIndices> faces;
+      for (std::size_t f = 0; f < side.faceCount(); ++f) {
+        const auto corners = side.face(f);
+        faces.push_back({corners[0], corners[1], corners[2]});
+      }
+      sheets.push_back(sheetOf(std::move(side.positions), std::move(faces), name, knife));
     }
   }
   return sheets;

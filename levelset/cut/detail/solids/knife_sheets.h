@@ -45,8 +45,9 @@ double roughSpacing(const RoughnessOptions& roughness, double size);
 class CutSource;
 
 /// The sheets of all rough blades and solids of a cut; of blades, what is in and near the solid that is cut.
-/// @throws Error if a knife's options are out of range, a solid is open, inside out or not finite, or a kerf
-/// is so wide that a solid's sides cross themselves.
-std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid);
+/// @throws Error if a knife's options are out of range, or a solid is open, inside out or not finite;
+/// Cancelled.
+std::vector<KnifeSheet> knifeSheets(const Knives& knives, float kerf, const CutSource& solid,
+                                    const Progress& progress);
 
 }  // namespace nephele::detail

@@ -234,6 +234,31 @@ bool isInside(const SolidSplitter& splitter, const Shell& shell, const Vec3d& p)
   return inside;
 }
 
+/// Makes one of points that rounding brought together, and leaves out triangles between them, which the other
+/// side of a cut loses as well.
+void joinEqualPoints(const SolidSplitter& splitter, std::vector<SolidTriangle>& triangles) {
+  std::vector<std::uint32_t> vertices;
+  vertices.reserve(3 * triangles.size());
+  for (const SolidTriangle& t : triangles)
+    vertices.insert(vertices.end(), t.vertices.begin(), t.vertices.end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  std::vector<Vec3d> positions;
+  positions.reserve(vertices.size());
+  for (const std::uint32_t v : vertices) positions.push_back(splitter.position(v));
+  const std::vector<std::uint32_t> first = firstEqualPosition(positions);
+  bool isJoined = false;
+  for (std::uint32_t i = 0; i < first.size(); ++i) isJoined |= first[i] != i;
+  if (!isJoined) return;
+  for (SolidTriangle& t : triangles)
+    for (std::uint32_t& v : t.vertices)
+      v = vertices[first[std::size_t(std::ranges::lower_bound(vertices, v) - vertices.begin())]];
+  std::erase_if(triangles, [](const SolidTriangle& t) {
+    const TriangleIndices& v = t.vertices;
+    return v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
+  });
+}
+
 }  // namespace
 
 std::vector<SolidTriangle> trianglesOf(const SolidSplitter& splitter, const Solid& solid) {
@@ -242,6 +267,7 @@ std::vector<SolidTriangle> trianglesOf(const SolidSplitter& splitter, const Soli
   for (const std::uint32_t t : solid.whole) triangles.push_back({t, splitter.triangle(t)});
   FaceTriangles faces(splitter, triangles);
   for (const SolidFace& face : solid.faces) faces.add(face, solid.edgesOf(face));
+  joinEqualPoints(splitter, triangles);
   return triangles;
 }
 

@@ -14,7 +14,7 @@ struct SolidTriangle {
 };
 
 /// The faces of a solid as triangles. Faces with the same corners at the same places, seen from either side,
-/// get the same triangles.
+/// get the same triangles. Points that rounding brought together are one.
 std::vector<SolidTriangle> trianglesOf(const SolidSplitter& splitter, const Solid& solid);
 
 /// A connected part of a solid, with the walls of the cavities in it.
