@@ -26,7 +26,7 @@ struct ShapeArguments {
   bool isGenerated() const { return species.has_value(); }
 
   /// What messages call the shape.
-  std::string name() const { return inputs.empty() ? "" : inputs.front(); }
+  std::string name() const { return inputs.empty() ? "--species" : inputs.front(); }
   /// The shape; where asked for, its mesh is written, too. Several inputs are combined on voxels of the size
   /// that `voxelSize` says for a longest side. @throws CLI::ValidationError where neither a file nor a
   /// species was given.

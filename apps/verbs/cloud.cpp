@@ -58,12 +58,12 @@ void growCloud(const CloudArguments& arguments, Run& run) {
   FieldSources sources = arguments.sources(shape, run);
   const CloudOptions options = arguments.resolved(sources, run);
   tellLayers(arguments, options, sources.box(), run);
-  const double bytes = namingFile("--amplitude", [&] { return estimatedCloudBytes(shape, options); });
+  const std::string whose = arguments.shape.name();
+  const double bytes = namingFile(whose, [&] { return estimatedCloudBytes(shape, options); });
   run.requireMemory(bytes, "use larger voxels (a lower --resolution or a larger --voxel-size)");
   // Distance, layers, density and perhaps the surface.
   run.expect(0.02, 0.9, int(options.layers.size()) + (options.withSurface ? 3 : 2));
-  Cloud cloud = namingFile(arguments.shape.name(),
-                           [&] { return arguments.cache.grown(shape, arguments, options, run); });
+  Cloud cloud = namingFile(whose, [&] { return arguments.cache.grown(shape, arguments, options, run); });
   run.expect(0.9, 1, 2);
   const auto fileOf = [&](VoxelGrid<float>& grid, const char* name, VdbGridInfo::Class gridClass) {
     return toVdb(std::move(grid), {name, gridClass, arguments.halfFloat});

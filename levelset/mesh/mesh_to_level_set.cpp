@@ -70,7 +70,7 @@ void judge(const Mesh& mesh, const VoxelGrid<float>& grid, double gridVolume, do
   const double wanted = std::min(most, kWorthANote);
   const double better = options.voxelSize * std::min(0.5, std::sqrt(0.5 * wanted / error));
   const std::string volumes =
-      gridError >= std::min(most, kWorthANote)
+      gridError >= (error >= most ? most : kWorthANote)
           ? fmt::format("it encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart", gridVolume,
                         solid, 100 * gridError)
           : fmt::format("its surface encloses a volume of {:.6g}, the mesh one of {:.6g} ({:.1f} % apart",

@@ -26,7 +26,7 @@ BrickSlab bricksAlong(const Box& box, int axis, float voxelSize) {
   if (!(first >= -kFarthest && last <= kFarthest))
     throw Error(
         fmt::format("layers: they would reach {:.3g} voxels from the origin, and {:.3g} can be numbered; use "
-                    "larger voxels or lower bumps",
+                    "larger voxels, lower bumps or a shape that is nearer to it",
                     std::max(-first, last) * BrickGrid::kBrick, kFarthest * BrickGrid::kBrick));
   return {int(first) - 1, int(last) + 2};
 }
