@@ -91,17 +91,23 @@ AttributeCharts::AttributeCharts(const Mesh& mesh, const MeshAttribute& attribut
     return e + 1 < edges.size() && edges[e].low == edges[e + 1].low && edges[e].high == edges[e + 1].high;
   };
   if (!poles_.empty()) {
-    // Around a pole the other ends of all edges go on; where charts merely meet they do not.
-    std::vector<std::uint8_t> isNone(mesh.positions.size());
+    // Around a pole the other ends of all edges go on, but where a turn ends; where charts merely meet they
+    // do not, though all their values may be whole numbers.
+    std::vector<std::uint32_t> breaks(mesh.positions.size());
+    const auto look = [&](std::uint32_t pole, std::uint32_t a, std::uint32_t b) {
+      if (!isPole(pole)) return;
+      const Offset offset = wholeOffset(a, b);
+      breaks[vertex[mesh.corners[pole]]] += !agree(a, b, offset) ? 2u : offset != Offset{} ? 1u : 0u;
+    };
     for (std::size_t e = 0; e < edges.size(); ++e) {
       if (!isPairAt(e)) continue;
       const auto [a0, b0, a1, b1] = ends(edges[e].corner, edges[e + 1].corner);
-      if (isPole(a0) && !agree(a1, b1, wholeOffset(a1, b1))) isNone[vertex[mesh.corners[a0]]] = 1;
-      if (isPole(a1) && !agree(a0, b0, wholeOffset(a0, b0))) isNone[vertex[mesh.corners[a1]]] = 1;
+      look(a0, a1, b1);
+      look(a1, a0, b0);
       ++e;
     }
     for (std::size_t c = 0; c < cornerCount; ++c)
-      if (isNone[vertex[mesh.corners[c]]]) poles_[c] = -1;
+      if (breaks[vertex[mesh.corners[c]]] > 1) poles_[c] = -1;
   }
 
   DisjointSets charts(triangleCount);

@@ -105,12 +105,12 @@ TEST(AttributeCharts, KnowThePolesAndTheSeamOfAGlobe) {
     for (int e = 0; e < 3; ++e) EXPECT_TRUE(charts.across(t, e).has_value());
 }
 
-// A box whose six sides are six charts in a row that leave gaps; their corners share v = 0 and 1.
-Mesh boxOfSixCharts(const Vec3d& low, const Vec3d& high) {
+// A box whose six sides are six charts in a row; their corners share v = 0 and 1.
+Mesh boxOfSixCharts(const Vec3d& low, const Vec3d& high, float step = 1.0f / 6, float width = 0.15f) {
   Mesh box = boxMesh(low, high);
   std::vector<float> uv;
   for (int side = 0; side < 6; ++side) {
-    const float u0 = float(side) / 6, u1 = u0 + 0.15f;
+    const float u0 = float(side) * step, u1 = u0 + width;
     for (const float x : {u0, 0.f, u1, 0.f, u1, 1.f, u0, 0.f, u1, 1.f, u0, 1.f}) uv.push_back(x);
   }
   box.attributes.push_back({"uv", MeshAttribute::Domain::corner, 2, uv});
@@ -124,6 +124,14 @@ TEST(AttributeCharts, DoNotTakeCornersWhereChartsMeetForPoles) {
   EXPECT_EQ(charts.period(0), 0);
   EXPECT_EQ(charts.seams().size(), 24u);
   for (std::size_t c = 0; c < box.corners.size(); ++c) EXPECT_EQ(charts.poleComponent(c), -1);
+}
+
+TEST(TransferAttributes, KeepsTheCornersOfABoxWhoseSidesAreWholeTiles) {
+  // Three sides meet in each corner, with whole numbers that differ, as around a pole.
+  const Mesh box = boxOfSixCharts({0, 0, 0}, {1, 1, 1}, 1, 1);
+  const detail::AttributeCharts charts(box, box.attributes[0]);
+  for (std::size_t c = 0; c < box.corners.size(); ++c) EXPECT_EQ(charts.poleComponent(c), -1);
+  EXPECT_EQ(transferAttributes(box, box, box.positions).attributes[0].values, box.attributes[0].values);
 }
 
 TEST(AttributeCharts, OfASoupAreThoseOfTheSurface) {
