@@ -121,8 +121,16 @@ TEST(Points, AreReadFromText) {
       << "x;y;z\r\n1;2;3\r\n\r\n# a comment\r\n +4, -5e-1 ,6,extra\r\n7\t8\t9";
   const Mesh points = readPoints(folder.file("p.csv"));
   EXPECT_EQ(points.positions, (std::vector<Vec3d>{{1, 2, 3}, {4, -0.5, 6}, {7, 8, 9}}));
-  for (const char* bad :
-       {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n", ""}) {
+  const std::vector<Vec3d> two{{1, 2, 3}, {4, 5, 6}};
+  for (const char* text : {"id,P.x,P.y,P.z\n7,1,2,3\n8,4,5,6\n", "z,mass,y,x\n3,9,2,1\n6,9,5,4\n",
+                           "\xef\xbb\xbf\"name\";\"pos_x\";\"pos_y\";\"pos_z\"\n\"a; b\";\"1\";2;3\n;4;5;6\n",
+                           "\"Points:0\",\"Points:1\",\"Points:2\",\"v:0\"\n1,2,3,0\n4,5,6,0\n",
+                           "//X Y Z R\n1 2 3 0\n4 5 6 0\n", "a,b,c\n1,2,3\n4,5,6\n"}) {
+    std::ofstream(folder.file("named.csv")) << text;
+    EXPECT_EQ(readPoints(folder.file("named.csv")).positions, two) << text;
+  }
+  for (const char* bad : {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n",
+                          "", "1,,2,3\n", "1 2 nan\n1 2 3\n", "x,y,z,w\n1,2\n"}) {
     std::ofstream(folder.file("bad.txt")) << bad;
     EXPECT_THROW(readPoints(folder.file("bad.txt")), Error) << bad;
   }
