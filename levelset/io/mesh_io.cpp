@@ -87,7 +87,7 @@ std::string readWholeFile(const std::string& path) {
 
 TextScanner::TextScanner(const MeshFile& file, bool continuation)
     : file_(file),
-      cursor_(file.bytes.data()),
+      cursor_(withoutByteOrderMark(file.bytes).data()),
       end_(file.bytes.data() + file.bytes.size()),
       continuation_(continuation) {}
 

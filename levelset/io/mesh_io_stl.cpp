@@ -15,6 +15,7 @@
 
 #include "nephele/levelset/io/detail/mesh_io_private.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele::detail {
 namespace {
@@ -31,7 +32,7 @@ std::uint32_t binaryFacetCount(const MeshFile& file) {
 }
 
 bool looksLikeText(const MeshFile& file) {
-  const std::string_view start = file.bytes.substr(0, 512);
+  const std::string_view start = withoutByteOrderMark(file.bytes).substr(0, 512);
   const std::size_t first = start.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && start.find('\0') == std::string_view::npos &&
          (start.substr(first).starts_with("solid") || start.substr(first).starts_with("SOLID"));

@@ -15,6 +15,7 @@
 #include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/text_file.h"
 
 namespace nephele {
 namespace {
@@ -23,11 +24,11 @@ namespace {
 std::vector<std::string_view> columnsOf(std::string_view line) {
   std::vector<std::string_view> columns;
   std::size_t at = 0;
-  const auto passBlanks = [&] { at = std::min(line.find_first_not_of(" \t\r", at), line.size()); };
+  const auto passBlanks = [&] { at = std::min(line.find_first_not_of(" \t", at), line.size()); };
   for (passBlanks(); at < line.size(); passBlanks()) {
     const bool isQuoted = line[at] == '"';
     const std::size_t begin = isQuoted ? at + 1 : at;
-    const std::size_t end = std::min(line.find_first_of(isQuoted ? "\"" : " \t\r,;", begin), line.size());
+    const std::size_t end = std::min(line.find_first_of(isQuoted ? "\"" : " \t,;", begin), line.size());
     columns.push_back(line.substr(begin, end - begin));
     at = isQuoted && end < line.size() ? end + 1 : end;
     passBlanks();
@@ -81,14 +82,14 @@ Axes axesOf(const std::vector<std::string_view>& titles) {
 
 Mesh readTable(const detail::MeshFile& file) {
   Mesh mesh;
-  std::string_view rest = file.bytes;
-  if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);
+  std::string_view rest = withoutByteOrderMark(file.bytes);
   Axes axes{0, 1, 2};
   bool isFirst = true;
   for (std::size_t line = 1; !rest.empty(); ++line) {
-    const std::size_t end = rest.find('\n');
+    const std::size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
     const std::string_view text = rest.substr(0, end);
-    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+    rest.remove_prefix(end);
+    rest.remove_prefix(rest.starts_with("\r\n") ? 2 : std::min<std::size_t>(rest.size(), 1));
     const std::vector<std::string_view> columns = columnsOf(text);
     if (columns.empty() || columns[0].starts_with('#')) continue;
     if (const auto p = pointOf(columns, axes))

@@ -9,6 +9,12 @@
 
 namespace nephele {
 
+std::string_view withoutByteOrderMark(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+  return text;
+}
+
 std::string readTextFile(const std::string& path, std::size_t mostBytes) {
   requireWholeName(path);
   std::error_code ignored;
@@ -22,6 +28,7 @@ std::string readTextFile(const std::string& path, std::size_t mostBytes) {
     require(text.size() <= mostBytes, path + ": is larger than " + std::to_string(mostBytes) + " bytes");
   }
   require(file.eof() && !file.bad(), path + ": cannot be read");
+  text.erase(0, text.size() - withoutByteOrderMark(text).size());
   return text;
 }
 

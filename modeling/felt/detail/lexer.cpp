@@ -67,9 +67,9 @@ class Lexer {
   }
   void skipLineComment() {
     const int begin = place_;
-    while (place_ < size() && here() != '\n') ++place_;
+    while (place_ < size() && here() != '\n' && here() != '\r') ++place_;
     int end = place_;
-    while (end > begin && (text_[end - 1] == '\r' || text_[end - 1] == ' ' || text_[end - 1] == '\t')) --end;
+    while (end > begin && (text_[end - 1] == ' ' || text_[end - 1] == '\t')) --end;
     result_.comments.push_back({{file_, begin, end}, codeInLine_});
   }
   void skipBlockComment() {

@@ -14,6 +14,8 @@
 #include "tests/support/run_program.h"
 #include "tests/support/test_data.h"
 
+using namespace std::string_literals;
+
 namespace nephele {
 namespace {
 
@@ -312,6 +314,17 @@ TEST(MeshIo, OffHasTextureCoordinatesBehindColoursOfThreeValuesOrFour) {
               opacity.empty() ? (std::vector<float>{1, 0.5f, 0, 0, 1, 0, 0, 0, 1})
                               : (std::vector<float>{1, 0.5f, 0, 0.25f, 0, 1, 0, 0.25f, 0, 0, 1, 0.25f}));
   }
+}
+
+TEST(MeshIo, TextMayBeginWithAMarkOfByteOrder) {
+  const std::string facet =
+      "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+  for (const auto& [name, text] : {std::pair{"a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"s},
+                                   {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"s},
+                                   {"a.stl", "solid a\n" + facet + "endsolid a\n"}})
+    EXPECT_EQ(readText(name, "\xef\xbb\xbf" + text).positions,
+              (std::vector<Vec3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}))
+        << name;
 }
 
 TEST(MeshIo, GltfAppliesNodesFlipsVAndTurnsMirroredFaces) {

@@ -20,6 +20,9 @@ TEST(TextFile, HoldsAllBytesOfAFile) {
   std::ofstream(folder.file("a.txt"), std::ios::binary) << text;
   EXPECT_EQ(readTextFile(folder.file("a.txt"), text.size()), text);
   EXPECT_EQ(readTextFile("/dev/null", 0), "");
+  std::ofstream(folder.file("mark.txt")) << "\xef\xbb\xbf"
+                                         << "text";
+  EXPECT_EQ(readTextFile(folder.file("mark.txt"), 100), "text") << "without its mark of byte order";
 }
 
 TEST(TextFile, WhatCannotBeReadIsRefused) {

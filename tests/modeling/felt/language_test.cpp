@@ -19,6 +19,11 @@ TEST(FeltLanguage, NumbersFollowTheRulesOfC) {
   EXPECT_EQ(printed("print(1 > 2 ? \"a\" : \"b\");"), "b\n");
 }
 
+TEST(FeltLanguage, LinesEndAsAnySystemEndsThem) {
+  for (const std::string& end : {std::string("\n"), std::string("\r\n"), std::string("\r")})
+    EXPECT_EQ(printed("// one" + end + "print(1); // and" + end + "print(2);" + end), "1\n2\n");
+}
+
 TEST(FeltLanguage, PowersBindTighterThanSignsAndToTheRight) {
   EXPECT_EQ(printed("print(-2 ^ 2, 2 ^ 3 ^ 2, 2 ^ -1);"), "-4 512 0.5\n");
 }
