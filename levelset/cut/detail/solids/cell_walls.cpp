@@ -3,9 +3,9 @@
 // A box around the solid is cut into the flat cells. What parts two of them, once, is the network of flat
 // walls; its edges are halved until they are short, each by a rule that looks at the edge alone, so that
 // walls keep meeting in the same points. Then the network is carried along a noise of three components for a
-// while: a flow moves no two points to one place, so that walls cross neither themselves nor each other,
-// however steep the noise is, and part space as the flat ones did. A point is in the cell that the flow
-// brings it back to.
+// while: a flow moves no two points to one place, so that walls cross neither themselves nor each other and
+// part space as the flat ones did; only triangles that are coarse for how steep the noise is may. A point is
+// in the cell that the flow brings it back to.
 #include "nephele/levelset/cut/detail/solids/cell_walls.h"
 
 #include <fmt/format.h>
@@ -237,7 +237,7 @@ KnifeSheet cellWalls(const Knives& knives, const CutSource& solid, const Progres
   }
 
   KnifeSheet sheet;
-  sheet.name = "the network of walls";
+  sheet.name = "the network of rough walls (less roughness or fewer octaves keep it smooth)";
   std::map<Label, std::uint32_t> frames;
   for (const Label& cells : walls.cells) {
     const auto [found, isNew] = frames.try_emplace(cells, std::uint32_t(sheet.frames.size()));
