@@ -27,7 +27,7 @@ import numpy.typing
 
 Array = numpy.typing.ArrayLike
 Vector = Union[Sequence[float], numpy.ndarray]
-Path = Union[str, "os.PathLike[str]"]
+Path = Union[str, bytes, "os.PathLike[str]"]
 Number = Union[int, float, str]
 Progress = Union[bool, Callable[[str, float], object], None]
 Volume = Union["Grid", Mapping[str, "Grid"], Path]

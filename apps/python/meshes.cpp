@@ -92,7 +92,7 @@ std::shared_ptr<felt::Shape> makeMesh(
   setFaces(shape->mesh, faces);
   if (attributes)
     for (const auto& [key, value] : *attributes)
-      addAttribute(shape->mesh, py::str(key), py::reinterpret_borrow<py::object>(value));
+      addAttribute(shape->mesh, key.cast<std::string>(), py::reinterpret_borrow<py::object>(value));
   for (const auto& [group, first, count] : groups) shape->mesh.groups.push_back({group, first, count});
   requireValid(shape->mesh);
   return shape;
@@ -146,7 +146,7 @@ py::dict attributesOf(const std::shared_ptr<felt::Shape>& self) {
       shape.push_back(bytes(width));
       strides.push_back(4);
     }
-    all[py::str(attribute.name)] = viewOf(attribute.values.data(), shape, strides, self);
+    all[py::cast(attribute.name)] = viewOf(attribute.values.data(), shape, strides, self);
   }
   return all;
 }

@@ -44,7 +44,7 @@ py::dict layersOf(const Self& self) {
     py::array_t<float> array = interleaved(self->image, channels);
     if (channels.size() == 1)
       array = array.reshape(std::vector<py::ssize_t>{self->image.height, self->image.width});
-    all[py::str(name)] = array;
+    all[py::cast(name)] = array;
   }
   return all;
 }
@@ -91,13 +91,13 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
       const Packed<float> layer = packedFrom<float>(value, "layer");
       if (layer.ndim() < 2 || layer.ndim() > 3 || layer.shape(0) != image.height ||
           layer.shape(1) != image.width)
-        throw py::value_error("layer '" + std::string(py::str(key)) + "': got " + shapeText(layer) +
+        throw py::value_error("layer '" + key.cast<std::string>() + "': got " + shapeText(layer) +
                               " for a picture of " + std::to_string(image.height) + " rows of " +
                               std::to_string(image.width));
       const auto width = std::size_t(layer.ndim() == 3 ? layer.shape(2) : 1);
       if (width > 4) throw py::value_error("a layer has at most 4 channels");
       for (std::size_t c = 0; c < width; ++c) {
-        const std::string name = py::str(key);
+        const auto name = key.cast<std::string>();
         add(layer.ndim() == 2 ? name : name + "." + (width <= 3 && name.size() == 1 ? "XYZ" : "RGBA")[c],
             false, layer.data() + c, width);
       }

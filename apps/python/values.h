@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/python/strings.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/felt/value.h"
 #include "nephele/render/image/exr_io.h"

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/python/strings.h"
 #include "nephele/modeling/base/progress.h"
 
 /// How work of C++ runs while Python stays alive.

@@ -182,7 +182,7 @@ py::object call(const std::string& who, const py::args& arguments, const py::kwa
     for (std::size_t i = 0; i < arguments.size(); ++i)
       add("", arguments[i], who + ": argument " + std::to_string(i + 1));
     for (const auto& [key, object] : named) {
-      const std::string name = py::str(key);
+      const auto name = key.cast<std::string>();
       if (name == "progress")
         progress = py::reinterpret_borrow<py::object>(object);
       else
@@ -286,7 +286,7 @@ py::dict runScript(const std::string& text, const std::map<std::string, std::str
     throw Error(error.what());
   }
   py::dict result;
-  for (const felt::Named& variable : variables) result[py::str(variable.name)] = toPython(variable.value);
+  for (const felt::Named& variable : variables) result[py::cast(variable.name)] = toPython(variable.value);
   return result;
 }
 

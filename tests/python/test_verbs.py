@@ -29,6 +29,36 @@ def pixels_of_png(data):
     return width, height, zlib.decompress(packed)
 
 
+class Names(Case):
+    def test_may_be_no_utf8(self):
+        folder = os.fsencode(self._folder.name)
+        name = os.fsdecode(os.path.join(folder, b"caf\xe9.ply"))
+        nephele.write(name, nephele.Mesh(*cube()))
+        self.assertIn(b"caf\xe9.ply", os.listdir(folder))
+        for path in (name, os.fsencode(name)):
+            self.assertEqual(len(nephele.read(path)), len(nephele.Mesh(*cube())))
+            self.assertEqual(nephele.info(path)["kind"], "mesh")
+            level = nephele.levelset(path, resolution=16, output=name[:-4] + ".vdb")
+            self.assertEqual(level.kind, "level set")
+        self.assertIn(b"caf\xe9.vdb", os.listdir(folder))
+        with self.assertRaises(nephele.Error) as refused:
+            nephele.read(name[:-4] + "_.ply")
+        self.assertIn("caf\udce9_.ply: ", str(refused.exception))
+        # What cannot even be such a name is refused as other texts are.
+        with self.assertRaises(nephele.Error):
+            nephele.noise("\ud800")
+
+    def test_of_attributes_may_be_no_utf8(self):
+        path = self.path("a.ply")
+        V, F = cube()
+        nephele.write(path, nephele.Mesh(V, F, {"cafe": np.arange(float(len(V)))}))
+        with open(path, "rb") as file:
+            content = file.read()
+        with open(path, "wb") as file:
+            file.write(content.replace(b" cafe\n", b" caf\xe9\n"))
+        self.assertEqual(list(nephele.read(path).attributes), ["caf\udce9"])
+
+
 class Objects(Case):
     def test_stand_for_files(self):
         V, F = cube()

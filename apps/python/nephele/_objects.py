@@ -10,6 +10,8 @@ from ._nephele import Error, Grid, Mesh, Picture
 
 _MESHES = (".obj", ".ply", ".stl", ".off", ".gltf", ".glb")
 _VOLUMES = (".vdb", ".nvdb")
+# Names of files; what is no UTF-8 is read as os.fsdecode does.
+PATHS = (str, bytes, os.PathLike)
 
 
 def _extension(path):
@@ -26,7 +28,7 @@ def grids_of(grids):
 def read(path):
     """What is in a file: a Mesh (.obj .ply .stl .off .gltf .glb), a Grid or a dict of them by name (.vdb .nvdb), or a
     Picture (.exr .png .hdr). Raises Error naming the path."""
-    path = os.fspath(path)
+    path = os.fsdecode(path)
     if _extension(path) in _VOLUMES:
         grids = _nephele._read_grids(path)
         if not grids:
@@ -40,7 +42,7 @@ def read(path):
 def write(path, thing):
     """Writes a Mesh (.obj .ply .stl), a Grid, a dict or a list of them (.vdb), or a Picture (.exr .png); whole or not
     at all. Raises Error naming the path."""
-    path = os.fspath(path)
+    path = os.fsdecode(path)
     if isinstance(thing, Picture):
         thing.save(path)
     elif isinstance(thing, Grid):
@@ -55,7 +57,7 @@ def write(path, thing):
 
 def info(path):
     """What `nephele info` says of a file, as a dict."""
-    return _nephele._info(os.fspath(path))
+    return _nephele._info(os.fsdecode(path))
 
 
 def as_mesh(thing):
@@ -66,8 +68,8 @@ def as_mesh(thing):
 
     if isinstance(thing, Mesh):
         return thing
-    if isinstance(thing, (str, os.PathLike)):
-        return read(thing) if _extension(os.fspath(thing)) not in _VOLUMES else read(thing).mesh()
+    if isinstance(thing, PATHS):
+        return read(thing) if _extension(os.fsdecode(thing)) not in _VOLUMES else read(thing).mesh()
     if isinstance(thing, numpy.ndarray) and thing.ndim == 2:
         return Mesh(thing, numpy.zeros((0, 3), int))
     if isinstance(thing, (tuple, list)) and len(thing) == 2:

@@ -8,7 +8,7 @@ import tempfile
 
 from . import _nephele
 from ._nephele import Error, Grid, MatrixField, Mesh, Picture, ScalarField, VectorField
-from ._objects import as_mesh, grids_of, read, write
+from ._objects import PATHS, as_mesh, grids_of, read, write
 
 # What each output beside the main one is, for those that are asked for with True.
 _OUTPUTS = {"surface": ".vdb", "shape_mesh": ".ply", "map": ".vdb", "points": ".ply", "warp": ".vdb",
@@ -81,8 +81,8 @@ class _Call:
 
     def path(self, thing, name):
         """The path of a file, or one that stands for an object."""
-        if isinstance(thing, (str, os.PathLike)):
-            return os.fspath(thing)
+        if isinstance(thing, PATHS):
+            return os.fsdecode(thing)
         if isinstance(thing, Grid):
             return self._file(_nephele._file_of_grids(name, [thing]), name)
         if isinstance(thing, dict) and thing and all(isinstance(grid, Grid) for grid in thing.values()):
@@ -101,8 +101,8 @@ class _Call:
     def _text(self, value, name):
         if isinstance(value, str):
             return value
-        if isinstance(value, os.PathLike):
-            return os.fspath(value)
+        if isinstance(value, PATHS):
+            return os.fsdecode(value)
         if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
             value = value.item()
         if isinstance(value, (int, float)):
@@ -191,10 +191,10 @@ def _made(verb, inputs, extension, named, *, name="output", before=(), session=N
         else:
             call.add_option(option, value)
     if several:
-        call.arguments.append("--output=" + os.fspath(output))
+        call.arguments.append("--output=" + os.fsdecode(output))
         return call.run(progress, kept)
     if output is not None:
-        output = os.fspath(output)
+        output = os.fsdecode(output)
         _nephele._try_output(output)
     main = call.room(name, extension, "output")
     statistics = call.run(progress, kept)
@@ -237,7 +237,7 @@ def mesh(what, /, **named):
 
 def transform(what, /, **named):
     is_volume = isinstance(what, (Grid, dict)) or (
-        isinstance(what, (str, os.PathLike)) and os.fspath(what).lower().endswith(("vdb",)))
+        isinstance(what, PATHS) and os.fsdecode(what).lower().endswith(("vdb",)))
     return _made("transform", [(what, "input")], ".vdb" if is_volume else ".ply", named, name="moved")
 
 
@@ -275,7 +275,7 @@ def cut(model, /, **named):
     call.add_input(model, "model")
     for option, value in named.items():
         call.add_option(option, value)
-    call.arguments.append("--output=" + os.fspath(folder))
+    call.arguments.append("--output=" + os.fsdecode(folder))
     return call.run(progress)["pieces"]
 
 
@@ -294,7 +294,7 @@ def turntable(volumes, /, *, frames, output=None, progress=None, **named):
         call.add_option(option, value)
     statistics = call.run(progress)
     digits = len(str(max((frame["frame"] for frame in statistics["frames"]), default=0)))
-    output = os.fspath(output)
+    output = os.fsdecode(output)
     return [_frame_path(output, frame["frame"], digits) for frame in statistics["frames"]]
 
 
