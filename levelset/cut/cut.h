@@ -94,7 +94,8 @@ struct Pieces {
 /// log n in all triangles, and some 20 microseconds for each pair of them that meet.
 /// The sides of a solid's kerf are its faces moved out and in. Where that folds them over, as in creases and
 /// of triangles that are small for the kerf, they are surfaces of the solid's distance, from samples 256 to
-/// the longest side of the mesh; where the solid is thinner than the kerf, it has no inner side.
+/// the longest side of the mesh, or 2048 to that of the solid; where the solid is thinner than the kerf, it
+/// has no inner side.
 /// @throws Error if the mesh or a solid has no faces, is open or inside out, values are not finite, a normal
 /// is 0, cells are equal, minVolume, kerf or a spacing < 0, a spacing is too fine for the solid, the mesh or
 /// a solid crosses itself where another surface passes, or there are fields among the knives; Cancelled. As

@@ -232,7 +232,8 @@ def wisps(source, /, **named):
 
 
 def mesh(what, /, **named):
-    return _made("mesh", [(what, "volume")], ".ply", named, name="mesh")
+    kind = "volume" if isinstance(what, (Grid, dict)) else "mesh"
+    return _made("mesh", [(what, kind)], ".ply", named, name="mesh")
 
 
 def transform(what, /, **named):

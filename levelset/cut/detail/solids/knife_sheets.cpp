@@ -281,9 +281,11 @@ bool isFolded(const Mesh& moved, std::span<const Vec3d> positions) {
 /// The sides of a solid as surfaces of its distance, in and around what is cut.
 std::array<Mesh, 2> sampledSides(const Mesh& blade, float kerf, const CutSource& solid,
                                  const Progress& progress) {
-  constexpr double kVoxels = 256;
+  // Of a blade that is far larger than what is cut no more is sampled than memory holds.
+  constexpr double kVoxels = 256, kMostOfBlade = 2048;
   const Box box{Vec3f(solid.low()), Vec3f(solid.high())};
-  const double voxel = double(box.longestSide()) / kVoxels;
+  const double voxel =
+      std::max(double(box.longestSide()) / kVoxels, double(boundingBox(blade).longestSide()) / kMostOfBlade);
   const auto grid =
       sampledBlade(solidKnife(triangulated(blade), voxel, kerf, progress).field, box, voxel, kerf, progress);
   return {marchingCubes(*grid, -0.5f * kerf, progress), marchingCubes(*grid, 0.5f * kerf, progress)};
