@@ -97,9 +97,10 @@ TEST(AddAir, DoesWithEveryPixelWhatTheAirBeforeItDoes) {
 TEST(AddAir, HoldsFromHereToTheHorizon) {
   constexpr int width = 64, height = 4;
   Image image = pictureOf(width, height, 1);
-  std::vector<float>& depths = const_cast<Image::Channel*>(image.find("Z_mean"))->values;
-  for (std::size_t i = 0; i != depths.size(); ++i)
-    depths[i] = 0.3f * std::exp2(18.0f * float(i % width) / float(width - 1));
+  std::vector<float> depths;
+  for (int i = 0; i != width * height; ++i)
+    depths.push_back(0.3f * std::exp2(18.0f * float(i % width) / float(width - 1)));
+  const_cast<Image::Channel*>(image.find("Z_mean"))->values = depths;
   const AerialPerspective air{skyAt(15), 1, 1};
   addAir(image, camera(width, height), air);
   for (int x = 0; x != width; ++x) {
