@@ -4,19 +4,10 @@
 
 #include <string>
 
-/// Texts as Python has them where names of files may be any bytes: what is no UTF-8 stands as os.fsdecode has
-/// it.
-namespace nephele::python {
-
-/// A new reference, or nothing and a Python error.
-inline PyObject* toText(const char* bytes, std::size_t size) {
-  return PyUnicode_DecodeUTF8(bytes, Py_ssize_t(size), "surrogateescape");
-}
-
-}  // namespace nephele::python
-
 namespace pybind11::detail {
 
+/// Texts as Python has them where names of files may be any bytes: what is no UTF-8 stands as os.fsdecode has
+/// it. Bytes are taken as they are.
 template <>
 struct type_caster<std::string> {
   PYBIND11_TYPE_CASTER(std::string, const_name("str"));
@@ -38,7 +29,7 @@ struct type_caster<std::string> {
   }
 
   static handle cast(const std::string& text, return_value_policy, handle) {
-    return nephele::python::toText(text.data(), text.size());
+    return PyUnicode_DecodeUTF8(text.data(), ssize_t(text.size()), "surrogateescape");
   }
 };
 
