@@ -66,7 +66,7 @@ std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
   options.standard.size = float(size.worldUnits(side));
   require(std::isfinite(side), input + ": its points lie further apart than numbers of 32 bits can hold");
   // A single point has no extent that a share could be taken of.
-  require(options.standard.size > 0,
+  require(options.standard.size > 0 || bringsGuideSizes(mesh),
           input + ": its points lie in one place; give --wisp-size in world units");
   run.begin("scatter");
   return namingFile(input, [&] {
@@ -152,7 +152,8 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
   addCount(app, "--guides", a.guideCount, 1, 100000000, "Guides to scatter.");
   addLength(app, "--wisp-size", a.size, "Radius of a wisp, where points bring none; percent: of the input.",
             Sign::positive);
-  addNumber(app, "--wisp-size-variation", a.sizeVariation, 0, 0.99, "Sizes vary by this share, up and down.");
+  addNumber(app, "--wisp-size-variation", a.sizeVariation, 0, 0.99,
+            "--wisp-size varies by this share, up and down.");
   addNumber(app, "--density", a.density, 0, any, "Mean density of a wisp, where points bring none.");
   app.add_option_function<std::string>(
          "--color",

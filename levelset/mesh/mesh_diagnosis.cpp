@@ -37,9 +37,10 @@ bool isDegenerate(const Mesh& mesh, std::span<const std::uint32_t> face,
                   std::span<const std::uint32_t> vertexOf) {
   const std::size_t n = face.size();
   if (n < 3) return true;
+  // Corners further apart may be equal: so are those of the bridge to a hole in a polygon.
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = i + 1; j < std::min(n, i + 3); ++j)
-      if (vertexOf[face[i]] == vertexOf[face[j]]) return true;
+    for (const std::size_t step : {1, 2})
+      if (vertexOf[face[i]] == vertexOf[face[(i + step) % n]]) return true;
   const Vec3d& a = mesh.positions[face[0]];
   for (std::size_t i = 2; i < n; ++i) {
     const Vec3d u = mesh.positions[face[i - 1]] - a, v = mesh.positions[face[i]] - a;

@@ -24,7 +24,7 @@ struct MeshDiagnosis {
   std::size_t misorientedEdges = 0;     ///< Two faces that run the same way.
   std::size_t unbalancedEdges = 0;      ///< Run more often one way than the other.
   std::size_t duplicateFaces = 0;
-  std::size_t degenerateFaces = 0;  ///< Repeated corners or no area.
+  std::size_t degenerateFaces = 0;  ///< A corner twice, in a row or about one other, or no area.
   std::size_t components = 0;       ///< Parts that share no vertex.
   long eulerCharacteristic = 0;
   double volume = 0;  ///< Signed; meaningful where closed.

@@ -29,16 +29,29 @@ void varySizes(std::vector<WispGuide>& guides, const GuideOptions& options) {
   for (WispGuide& guide : guides) guide.size *= 1 + options.sizeVariation * (2 * stream.uniform() - 1);
 }
 
+const MeshAttribute* vertexAttribute(const Mesh& mesh, std::initializer_list<std::string_view> names,
+                                     int width) {
+  for (const std::string_view name : names)
+    for (const MeshAttribute& a : mesh.attributes)
+      if (a.name == name && a.width == width && a.domain == MeshAttribute::Domain::vertex) return &a;
+  return nullptr;
+}
+
+const MeshAttribute* guideSizes(const Mesh& mesh) {
+  return vertexAttribute(mesh, {"size", "pscale", "radius"}, 1);
+}
+
 /// What the vertices of a mesh say about guides.
 class GuideAttributes {
  public:
   GuideAttributes(const Mesh& mesh, const GuideOptions& options) : mesh_(mesh), standard_(options.standard) {
-    size_ = find({"size", "pscale", "radius"}, 1);
-    density_ = find({"density"}, 1);
-    color_ = find({"color"}, 3);
-    if (!color_) color_ = find({"color"}, 4);
-    velocity_ = find({"v"}, 3);
-    velocityParts_ = {find({"vx"}, 1), find({"vy"}, 1), find({"vz"}, 1)};
+    const auto find = [&](std::string_view name, int width) { return vertexAttribute(mesh, {name}, width); };
+    size_ = guideSizes(mesh);
+    density_ = find("density", 1);
+    color_ = find("color", 3);
+    if (!color_) color_ = find("color", 4);
+    velocity_ = find("v", 3);
+    velocityParts_ = {find("vx", 1), find("vy", 1), find("vz", 1)};
   }
 
   WispGuide at(std::uint32_t vertex) const {
@@ -55,12 +68,6 @@ class GuideAttributes {
   }
 
  private:
-  const MeshAttribute* find(std::initializer_list<std::string_view> names, int width) const {
-    for (const std::string_view name : names)
-      for (const MeshAttribute& a : mesh_.attributes)
-        if (a.name == name && a.width == width && a.domain == MeshAttribute::Domain::vertex) return &a;
-    return nullptr;
-  }
   static Vec3f vector(const MeshAttribute& a, std::uint32_t vertex) {
     const float* v = a.values.data() + std::size_t(vertex) * std::size_t(a.width);
     return {v[0], v[1], v[2]};
@@ -99,6 +106,10 @@ WispGuide blended(const std::array<WispGuide, 3>& g, const Vec3f& w) {
 
 }  // namespace
 
+bool bringsGuideSizes(const Mesh& mesh) {
+  return guideSizes(mesh) != nullptr;
+}
+
 std::vector<WispGuide> guidesOnVertices(const Mesh& mesh, const GuideOptions& options) {
   requireOptions(options);
   requireValid(mesh);
@@ -107,7 +118,7 @@ std::vector<WispGuide> guidesOnVertices(const Mesh& mesh, const GuideOptions& op
   std::vector<WispGuide> guides;
   guides.reserve(mesh.positions.size());
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) guides.push_back(attributes.at(std::uint32_t(v)));
-  varySizes(guides, options);
+  if (!bringsGuideSizes(mesh)) varySizes(guides, options);
   return guides;
 }
 
@@ -135,7 +146,7 @@ std::vector<WispGuide> guidesOnSurface(const Mesh& mesh, const GuideOptions& opt
     guides.push_back(blended({attributes.at(corner[0]), attributes.at(corner[1]), attributes.at(corner[2])},
                              {1 - root, root * (1 - share), root * share}));
   }
-  varySizes(guides, options);
+  if (!bringsGuideSizes(mesh)) varySizes(guides, options);
   return guides;
 }
 

@@ -16,10 +16,14 @@ struct GuideOptions {
   std::size_t count = 200;
   /// Size, density, colour and velocity of guides that bring none of their own.
   WispGuide standard{};
-  /// Each size is multiplied by a number drawn evenly between 1 - variation and 1 + variation; 0 to 0.99.
+  /// Sizes of guides that bring none are multiplied by a number drawn evenly between 1 - variation and
+  /// 1 + variation; 0 to 0.99.
   float sizeVariation = 0.0f;
   std::uint32_t seed = 0;
 };
+
+/// True where the vertices of a mesh give guides their sizes, by an attribute as below.
+bool bringsGuideSizes(const Mesh& mesh);
 
 /// A guide on every vertex, in order. Vertex attributes give what they are called: the size `size`, `pscale`
 /// or `radius`, the density `density`, the colour `color`, the velocity `vx`, `vy`, `vz` or `v` of width 3.

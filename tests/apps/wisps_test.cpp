@@ -87,7 +87,9 @@ TEST_F(WispsVerb, TakesPointsWithWhatTheyCarry) {
                                                   "--points " +
                                                   file("dots.ply"));
   ASSERT_EQ(result.exitCode, 0) << result.errors;
-  EXPECT_NEAR(mass(file("w.vdb")), 4.0 / 3 * M_PI * (0.125 + 0.015625) * 1, 0.7);
+  // Density 1 in two spheres of the radii that the points bring.
+  const double expected = 4.0 / 3 * M_PI * (0.125 + 0.015625);
+  EXPECT_NEAR(mass(file("w.vdb")) / expected, 1, 1e-4);
   const std::vector<VdbGrid> grids = readVdbFile(file("w.vdb"));
   ASSERT_EQ(grids.size(), 2u);
   EXPECT_EQ(describe(grids[1]).name, "Cd");
@@ -106,6 +108,15 @@ TEST_F(WispsVerb, TakesPointsWithWhatTheyCarry) {
   Vec3d sum{};
   for (std::size_t i = 0; i < 2000; ++i) sum += dots.positions[2000 + i] / 2000.0;
   EXPECT_NEAR(sum.x, 3, 0.25);
+}
+
+// --wisp-size is a share of the extent of points, which one has none of, but needs none where it brings a
+// size.
+TEST_F(WispsVerb, TakesOnePointWithASizeOfItsOwn) {
+  const std::string point = pointsFile("p.ply", {"1 2 3 0.5"}, "property float radius\n");
+  const ProgramResult result = wisps("w.vdb", point + kSmall + "--density 1");
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_NEAR(mass(file("w.vdb")) / (4.0 / 3 * M_PI * 0.125), 1, 1e-4);
 }
 
 TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {

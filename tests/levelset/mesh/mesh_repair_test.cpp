@@ -79,6 +79,24 @@ TEST(MeshDiagnosis, ProblemsAreInWords) {
   EXPECT_EQ(diagnose(cube(true)).problems(), std::vector<std::string>{"oriented inwards"});
 }
 
+TEST(MeshDiagnosis, FacesWithACornerTwiceAreDegenerateUnlessItIsABridge) {
+  const auto degenerate = [](const std::vector<std::uint32_t>& corners) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {1, 1, 0}, {1, 2, 0}, {2, 1, 0}};
+    mesh.addFace(corners);
+    return diagnose(mesh).degenerateFaces;
+  };
+  EXPECT_EQ(degenerate({0, 1, 2, 3}), 0u);
+  EXPECT_EQ(degenerate({0, 1, 2, 0}), 1u);
+  EXPECT_EQ(degenerate({0, 0, 1, 2}), 1u);
+  EXPECT_EQ(degenerate({0, 1, 2, 1, 3}), 1u);
+  EXPECT_EQ(degenerate({1, 2, 3, 0, 2}), 1u);
+  EXPECT_EQ(degenerate({0, 1, 2}), 0u);
+  EXPECT_EQ(degenerate({1, 3, 1}), 1u);
+  // A square with a triangle cut out of it, which a bridge from corner 0 leads to.
+  EXPECT_EQ(degenerate({0, 1, 2, 3, 0, 4, 5, 6, 4}), 0u);
+}
+
 TEST(MeshDiagnosis, SolidsThatShareAnEdgeAreClosedButNotManifold) {
   Mesh mesh;
   addCube(mesh, {0, 0, 0}, 1);

@@ -330,6 +330,17 @@ TEST(WispGuides, SizesVaryWithinTheirLimits) {
   EXPECT_NEAR(sum / 2000, 2, 0.06);
 }
 
+TEST(WispGuides, SizesOfTheirOwnDoNotVary) {
+  Mesh mesh = twoTriangles();
+  EXPECT_FALSE(bringsGuideSizes(mesh));
+  EXPECT_NE(guidesOnVertices(mesh, {.sizeVariation = 0.5f})[2].size, 1);
+  mesh.attributes.push_back({"pscale", MeshAttribute::Domain::vertex, 1, {2, 2, 2, 2, 2, 2}});
+  EXPECT_TRUE(bringsGuideSizes(mesh));
+  for (const WispGuide& g : guidesOnVertices(mesh, {.sizeVariation = 0.5f})) EXPECT_EQ(g.size, 2);
+  for (const WispGuide& g : guidesOnSurface(mesh, {.count = 9, .sizeVariation = 0.5f}))
+    EXPECT_NEAR(g.size, 2, 1e-6);  // weights of corners add up to 1, to rounding
+}
+
 TEST(WispGuides, RefuseWhatHoldsNone) {
   Mesh empty;
   EXPECT_NE(saidBy([&] { guidesOnVertices(empty); }).find("no vertices"), std::string::npos);
