@@ -136,7 +136,7 @@ Surfaces::Surfaces(std::vector<SurfaceObject> objects, const Progress& progress)
   }
   Scene& scene = *scene_;
   scene.units = BoxUnits(box_);
-  clearance_ = 1e-5 * double(std::max(box_.longestSide(), 1e-30f));
+  clearance_ = 1e-5 * double(std::max(shadeBox_.longestSide(), 1e-30f));
   scene.device = rtcNewDevice(nullptr);
   require(scene.device != nullptr, "objects: Embree cannot be started");
   rtcSetDeviceMemoryMonitorFunction(

@@ -77,7 +77,9 @@ class Surfaces {
   bool castsShadows_ = false;
 };
 
-/// A horizontal square at height `height` about `centre`, `size` wide: the ground.
+/// A horizontal square at height `height` about `centre`, `size` wide: the ground. It is made of squares,
+/// each ten times as wide as the one within, so that rays find places near its middle as exactly as on a
+/// small one.
 Mesh groundPlane(const Vec3f& centre, float height, float size);
 
 }  // namespace nephele

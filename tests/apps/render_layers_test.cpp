@@ -208,6 +208,20 @@ TEST_F(RenderLayers, ObjectsAreSeenWhereTheDensityIsScaledToNothing) {
   for (const float alpha : empty.channel("A").values) ASSERT_EQ(alpha, 0.0f);
 }
 
+// The horizon of a plane is at the height of the camera: level, whatever the azimuth.
+TEST_F(RenderLayers, TheGroundReachesToALevelHorizon) {
+  const TemporaryFolder folder;
+  const std::string options =
+      " --camera-position 20,3,22 --look-at 0,3,0 --fov 20 --density-scale 0 --ground --ground-height -2 "
+      "--size 200x100 --light-quality draft";
+  ASSERT_EQ(runProgram("render " + fog() + " -o " + folder.file("a.exr") + options).exitCode, 0);
+  const Image image = readImage(folder.file("a.exr"));
+  for (int x = 0; x < 200; ++x) {
+    ASSERT_EQ(image.at("A", x, 48), 0.0f) << x;
+    ASSERT_EQ(image.at("A", x, 51), 1.0f) << x;
+  }
+}
+
 TEST_F(RenderLayers, ObjectsStandBesideTheVolume) {
   const TemporaryFolder folder;
   const std::string options =

@@ -93,7 +93,9 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
     const Box& box = seen.box;
     const Length height = groundHeight.value_or(Length{0, true});
     const double y = height.worldUnits(seen.longestSide) + (height.relative ? double(box.min.y) : 0.0);
-    all.push_back({.mesh = groundPlane(box.center(), float(y), 200 * box.longestSide()),
+    // Seen from up to 50 sides of the volume above it, its edge is less than a pixel below the horizon.
+    constexpr float kGroundSides = 2e5f;
+    all.push_back({.mesh = groundPlane(box.center(), float(y), kGroundSides * box.longestSide()),
                    .colour = groundColour,
                    .castsShadows = false});
   }

@@ -94,6 +94,27 @@ TEST(Surfaces, AreHitAlikeHoweverTinyOrVast) {
   }
 }
 
+// A plane 2 below: distances along rays that sink by 2 in so many units follow from the closed form.
+TEST(Surfaces, TheGroundIsMetExactlyFromNearItsMiddleToTheHorizon) {
+  const Surfaces ground({{.mesh = groundPlane({1, 5, -3}, -2, 2e5f), .castsShadows = false}});
+  for (const double far : {0.0, 0.5, 3.0, 40.0, 1e3, 9e4})
+    for (const double azimuth : {0.1, 1.0, 2.5, 4.4}) {
+      const Vec3d way{far * std::cos(azimuth), -2, far * std::sin(azimuth)};
+      const auto hit = ground.hit({{1, 0, -3}, normalize(way)});
+      ASSERT_TRUE(hit) << far << " " << azimuth;
+      EXPECT_NEAR(hit->distance / length(way), 1, 2e-6) << far << " " << azimuth;
+      EXPECT_EQ(hit->normal, (Vec3f{0, 1, 0}));
+    }
+  EXPECT_FALSE(ground.hit({{1, 0, -3}, normalize(Vec3d{2e5, -2, 0})}));
+}
+
+// Rays of shadows begin as near to a surface as what casts shadows asks for, however wide the ground is.
+TEST(Surfaces, TheGroundDoesNotMoveShadowsAway) {
+  const Surfaces object({{square(0, 1)}}),
+      both({{square(0, 1)}, {.mesh = groundPlane({}, -2, 2e5f), .castsShadows = false}});
+  EXPECT_EQ(both.clearance(), object.clearance());
+}
+
 TEST(Surfaces, AreNotMetFromFartherAwayThanFloatsTell) {
   // Embree ends the program where rays begin beyond 1.8e18 from what it holds, in units of about its size.
   const Surfaces surfaces({{square(0)}});
