@@ -10,6 +10,7 @@
 #include "nephele/levelset/grid/bake.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/system.h"
 
 namespace nephele::python {
@@ -235,8 +236,8 @@ std::shared_ptr<PythonGrid> baked(const PythonScalarField& self, double voxelSiz
   watched(watch, progress, [&] {
     const double places = double(options.box.size().x) * options.box.size().y * options.box.size().z /
                           std::pow(kBrickSide * voxelSize, 3);
-    require(voxelSize > 0, "bake: voxel_size must be > 0, got " + std::to_string(voxelSize));
-    require(places < 2e9, "bake: voxels of " + std::to_string(voxelSize) + " are too small for that box");
+    require(voxelSize > 0, "bake: voxel_size must be > 0, got " + numberText(voxelSize));
+    require(places < 2e9, "bake: voxels of " + numberText(voxelSize) + " are too small for that box");
     grid = bakeGrid(self.field(), options, watch);
   });
   return std::make_shared<PythonGrid>(
@@ -318,7 +319,7 @@ class FunctionOfPython final : public FieldNode<T> {
 template <class T>
 py::object functionField(const py::function& function, double step,
                          const std::optional<std::pair<float, float>>& range) {
-  if (!(step > 0)) throw py::value_error("field: step must be > 0, got " + std::to_string(step));
+  if (!(step > 0)) throw py::value_error("field: step must be > 0, got " + numberText(step));
   Interval bounds;
   if (range) bounds = {range->first, range->second};
   if (range && !(bounds.min <= bounds.max))

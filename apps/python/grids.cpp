@@ -9,6 +9,7 @@
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele::python {
 namespace {
@@ -113,7 +114,7 @@ Self makeGrid(const py::object& object, double voxelSize, const py::object& orig
   for (int axis = 0; axis < 3; ++axis)
     if (array.shape(axis) > 1 << 20) throw py::value_error("grid: more than 2^20 voxels along an axis");
   if (!(voxelSize > 0 && voxelSize < 1e30))
-    throw py::value_error("grid: voxel_size must be > 0, got " + std::to_string(voxelSize));
+    throw py::value_error("grid: voxel_size must be > 0, got " + numberText(voxelSize));
   const Class gridClass = kind ? classNamed(*kind) : isVector ? Class::unknown : Class::fogVolume;
   if (gridClass == Class::levelSet && isVector)
     throw py::value_error("grid: a level set holds numbers, not vectors");

@@ -14,6 +14,7 @@
 #include "nephele/levelset/mesh/mesh_distance.h"
 #include "nephele/levelset/mesh/nearest_on_mesh.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -98,8 +99,7 @@ namespace {
 GriddedCumulo layersOn(const Mesh& mesh, const CloudOptions& options, const Progress& progress,
                        KeptLayers* kept = nullptr) {
   requireValid(mesh);
-  require(options.voxelSize > 0,
-          "makeCloud: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  require(options.voxelSize > 0, "makeCloud: voxelSize must be > 0, got " + numberText(options.voxelSize));
   require(!options.layers.empty(), "makeCloud: there must be at least one layer");
   const std::vector<CumuloLayer>& layers = options.layers;
   const float edge = cloudEdgeReach(thickestEdge(options), options.voxelSize);

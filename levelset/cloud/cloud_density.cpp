@@ -19,6 +19,7 @@
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -205,17 +206,16 @@ class GridBuilder {
 namespace detail {
 
 void requireDensity(const CloudDensityOptions& options, const Box& box) {
-  require(options.voxelSize > 0,
-          "cloudDensity: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+  require(options.voxelSize > 0, "cloudDensity: voxelSize must be > 0, got " + numberText(options.voxelSize));
   const Interval edge = options.edgeThickness.range(Box::everywhere());
   require(edge.min > 0 && std::isfinite(edge.max),
           "cloudDensity: edgeThickness must be > 0 and finite, got " +
-              std::to_string(edge.min > 0 ? edge.max : edge.min));
+              numberText(edge.min > 0 ? edge.max : edge.min));
   require(!options.edgeExponent || (*options.edgeExponent > 0 && std::isfinite(*options.edgeExponent)),
-          "cloudDensity: edgeExponent must be > 0, got " + std::to_string(options.edgeExponent.value_or(0)));
+          "cloudDensity: edgeExponent must be > 0, got " + numberText(options.edgeExponent.value_or(0)));
   const Interval factor = options.factor.range(box);
   require(factor.min >= 0,
-          "cloudDensity: the factor must not be negative, got values from " + std::to_string(factor.min));
+          "cloudDensity: the factor must not be negative, got values from " + numberText(factor.min));
 }
 
 }  // namespace detail
@@ -230,7 +230,7 @@ VoxelGrid<float> cloudDensity(const GriddedCumulo& cloud, const CloudDensityOpti
 }
 
 VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize, const Progress& progress) {
-  require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + std::to_string(voxelSize));
+  require(voxelSize > 0, "cloudSurface: voxelSize must be > 0, got " + numberText(voxelSize));
   progress.begin("surface");
   detail::releaseFreed();
   return GridBuilder(cloud, voxelSize, LevelSetRule(kCloudSurfaceVoxels * voxelSize), 1.0f)
@@ -240,8 +240,7 @@ VoxelGrid<float> cloudSurface(const GriddedCumulo& cloud, float voxelSize, const
 CloudLevels cloudLevels(const GriddedCumulo& cloud, float voxelSize, float halfWidth,
                         const Progress& progress) {
   require(voxelSize > 0 && halfWidth > 0, "cloudLevels: voxelSize and halfWidth must be > 0, got " +
-                                              std::to_string(voxelSize) + " and " +
-                                              std::to_string(halfWidth));
+                                              numberText(voxelSize) + " and " + numberText(halfWidth));
   progress.begin("levels");
   detail::releaseFreed();
   GridBuilder builder(cloud, voxelSize, LevelSetRule(halfWidth), 1.0f);

@@ -36,6 +36,7 @@
 #include "nephele/levelset/grid/large_buffer.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/cloud/surface_point.h"
 #include "nephele/modeling/field/operations.h"
 
@@ -415,7 +416,7 @@ GriddedCumulo griddedCumulo(const ScalarField& base, const std::vector<CumuloLay
           "griddedCumulo: medialSmoothing must be 0 to " + std::to_string(kMaxMedialSmoothing) + ", got " +
               std::to_string(options.medialSmoothing));
   require(options.edge >= 0 && std::isfinite(options.edge),
-          "griddedCumulo: edge must be >= 0 and finite, got " + std::to_string(options.edge));
+          "griddedCumulo: edge must be >= 0 and finite, got " + numberText(options.edge));
   require(!layers.empty(), "griddedCumulo: there must be at least one layer");
 
   LayerSampler sampler(layers, options, progress);

@@ -21,6 +21,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -340,7 +341,7 @@ class Heat {
 
 MedialSmoothing smoothMedialJumps(BrickSamples& samples, const MedialSmoothingOptions& options,
                                   const Progress& progress) {
-  require(options.jump > 0, "smoothMedialJumps: jump must be > 0, got " + std::to_string(options.jump));
+  require(options.jump > 0, "smoothMedialJumps: jump must be > 0, got " + numberText(options.jump));
   require(options.dilation >= 0 && options.steps >= 0, "smoothMedialJumps: counts must be >= 0");
   const Neighbours neighbours(samples);
   Mask mask(neighbours);

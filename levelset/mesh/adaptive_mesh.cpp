@@ -19,6 +19,7 @@
 
 #include "nephele/levelset/grid/openvdb_bridge.h"
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 
@@ -35,9 +36,9 @@ float unitOfValues(const BrickGrid& grid) {
 }  // namespace
 
 Mesh adaptiveMesh(const BrickGrid& grid, double isovalue, double adaptivity) {
-  require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + std::to_string(isovalue));
+  require(std::isfinite(isovalue), "adaptiveMesh: isovalue must be finite, got " + numberText(isovalue));
   require(adaptivity >= 0 && adaptivity <= 1,
-          "adaptiveMesh: adaptivity must be in [0, 1], got " + std::to_string(adaptivity));
+          "adaptiveMesh: adaptivity must be in [0, 1], got " + numberText(adaptivity));
   const float unit = unitOfValues(grid);
   detail::TreeValues negated = detail::TreeValues::negated(grid.background() * unit);
   negated.sign *= unit;

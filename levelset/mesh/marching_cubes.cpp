@@ -25,6 +25,7 @@
 #include "nephele/levelset/mesh/marching_cubes_table.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 namespace {
@@ -368,7 +369,7 @@ class Mesher {
 }  // namespace
 
 Mesh marchingCubes(const BrickGrid& grid, float isovalue, const Progress& progress) {
-  require(std::isfinite(isovalue), "marchingCubes: isovalue must be finite, got " + std::to_string(isovalue));
+  require(std::isfinite(isovalue), "marchingCubes: isovalue must be finite, got " + numberText(isovalue));
   return Mesher(grid, isovalue).run(progress);
 }
 

@@ -1,5 +1,7 @@
 #include "nephele/modeling/base/printable.h"
 
+#include <charconv>
+
 namespace nephele {
 
 std::string printable(std::string_view text, std::size_t most) {
@@ -25,6 +27,11 @@ std::string quoted(std::string_view text, std::size_t most) {
   result += printable(text, most);
   result += '\'';
   return result;
+}
+
+std::string numberText(double value) {
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value, std::chars_format::general, 6).ptr};
 }
 
 bool isUtf8(std::string_view text) {

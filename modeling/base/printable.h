@@ -13,6 +13,9 @@ std::string printable(std::string_view text, std::size_t most = std::string_view
 /// The same between single quotes.
 std::string quoted(std::string_view text, std::size_t most = std::string_view::npos);
 
+/// A number as messages and scripts show it: six digits, with a point whatever the locale of the process.
+std::string numberText(double value);
+
 /// Whether `text` is whole characters in UTF-8: none in a longer form than it needs, no surrogates.
 bool isUtf8(std::string_view text);
 

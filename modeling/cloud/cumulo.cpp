@@ -19,6 +19,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/cloud/surface_point.h"
 #include "nephele/modeling/field/operations.h"
 
@@ -174,7 +175,7 @@ class LayerNode final : public FieldNode<float> {
 
 ScalarField cumulo(const ScalarField& base, const std::vector<CumuloLayer>& layers, CumuloOptions options) {
   require(options.voxelSize > 0 && std::isfinite(options.voxelSize),
-          "cumulo: voxelSize must be > 0, got " + std::to_string(options.voxelSize));
+          "cumulo: voxelSize must be > 0, got " + numberText(options.voxelSize));
   require(options.newtonSteps >= 1 && options.newtonSteps <= 64,
           "cumulo: newtonSteps must be 1 to 64, got " + std::to_string(options.newtonSteps));
   detail::requireSane(layers);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/constant_node.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise.h"
@@ -82,14 +83,13 @@ class RampNode final : public FieldNode<float> {
 
 void requireAbove(float value, float low, const char* name) {
   require(value > low && std::isfinite(value), "densityFactor: " + std::string(name) + " must be > " +
-                                                   std::to_string(low) + " and finite, got " +
-                                                   std::to_string(value));
+                                                   numberText(low) + " and finite, got " + numberText(value));
 }
 
 void requireWithin(float value, float low, float high, const char* name) {
   require(value >= low && value <= high, "densityFactor: " + std::string(name) + " must be " +
-                                             std::to_string(low) + " to " + std::to_string(high) + ", got " +
-                                             std::to_string(value));
+                                             numberText(low) + " to " + numberText(high) + ", got " +
+                                             numberText(value));
 }
 
 }  // namespace
@@ -100,16 +100,15 @@ ScalarField ramp(const ScalarField& f, std::vector<RampStop> stops) {
     require(std::isfinite(stops[i].at) && std::isfinite(stops[i].value),
             "ramp: stop " + std::to_string(i + 1) + " is not finite");
     if (i == 0) continue;
-    require(stops[i].at >= stops[i - 1].at, "ramp: places must rise, got " + std::to_string(stops[i].at) +
-                                                " after " + std::to_string(stops[i - 1].at));
+    require(stops[i].at >= stops[i - 1].at, "ramp: places must rise, got " + numberText(stops[i].at) +
+                                                " after " + numberText(stops[i - 1].at));
   }
   return ScalarField(std::make_shared<RampNode>(f.node(), std::move(stops)));
 }
 
 ScalarField heightBetween(float low, float high) {
-  require(
-      low < high && std::isfinite(low) && std::isfinite(high),
-      "heightBetween: low must be below high, got " + std::to_string(low) + " and " + std::to_string(high));
+  require(low < high && std::isfinite(low) && std::isfinite(high),
+          "heightBetween: low must be below high, got " + numberText(low) + " and " + numberText(high));
   return plane({0, low, 0}, {0, 1, 0}) / (high - low);
 }
 
@@ -124,7 +123,7 @@ ScalarField densityFactor(const DensityProfile& profile) {
   if (!profile.heightProfile.empty()) {
     for (const RampStop& stop : profile.heightProfile)
       require(stop.value >= 0,
-              "densityFactor: values of heightProfile must be >= 0, got " + std::to_string(stop.value));
+              "densityFactor: values of heightProfile must be >= 0, got " + numberText(stop.value));
     factor = factor * ramp(heightBetween(profile.low, profile.high), profile.heightProfile);
   }
   requireWithin(profile.thinOut, 0, 1, "thinOut");
@@ -133,9 +132,8 @@ ScalarField densityFactor(const DensityProfile& profile) {
     factor = factor * (1.0f - profile.thinOut * smoothstep(profile.thinOutFrom, 1,
                                                            heightBetween(profile.low, profile.high)));
   }
-  require(
-      profile.interiorNoise >= 0 && std::isfinite(profile.interiorNoise),
-      "densityFactor: interiorNoise must be >= 0 and finite, got " + std::to_string(profile.interiorNoise));
+  require(profile.interiorNoise >= 0 && std::isfinite(profile.interiorNoise),
+          "densityFactor: interiorNoise must be >= 0 and finite, got " + numberText(profile.interiorNoise));
   if (profile.interiorNoise > 0) {
     requireAbove(profile.interiorFrequency, 0, "interiorFrequency");
     const ScalarField noise = fractalSum(

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/lattice_noise.h"
 #include "nephele/modeling/noise/noise_draw.h"
@@ -34,7 +35,7 @@ float largest(const ScalarField& field, const char* what, std::size_t layer) {
 void requireNotNegative(const Interval& range, const std::string& name) {
   constexpr float kRounding = 1e-5f;
   require(std::isfinite(range.max) && range.min >= -kRounding * range.max,
-          name + " must be >= 0, got " + std::to_string(std::isfinite(range.max) ? range.min : range.max));
+          name + " must be >= 0, got " + numberText(std::isfinite(range.max) ? range.min : range.max));
 }
 
 void requireSaneLayer(const std::vector<CumuloLayer>& layers, std::size_t index) {
@@ -43,13 +44,13 @@ void requireSaneLayer(const std::vector<CumuloLayer>& layers, std::size_t index)
   const std::string name = "cumulo: layer " + std::to_string(index + 1) + ": ";
   const Interval scale = layer.billowScale.range(Box::everywhere());
   require(scale.min > 0 && std::isfinite(scale.max),
-          name + "billowScale must be > 0, got " + std::to_string(scale.min > 0 ? scale.max : scale.min));
+          name + "billowScale must be > 0, got " + numberText(scale.min > 0 ? scale.max : scale.min));
   require(layer.frequency > 0 && std::isfinite(layer.frequency),
-          name + "frequency must be > 0, got " + std::to_string(layer.frequency));
+          name + "frequency must be > 0, got " + numberText(layer.frequency));
   require(layer.detail > 0 && std::isfinite(layer.detail),
-          name + "detail must be > 0, got " + std::to_string(layer.detail));
+          name + "detail must be > 0, got " + numberText(layer.detail));
   require(!layer.steepest || (*layer.steepest > 0 && std::isfinite(*layer.steepest)),
-          name + "steepest must be > 0, got " + std::to_string(layer.steepest.value_or(0)));
+          name + "steepest must be > 0, got " + numberText(layer.steepest.value_or(0)));
   requireNotNegative(layer.amplitude.range(Box::everywhere()), name + "amplitude");
   requireNotNegative(layer.billow.range(Box::everywhere()), name + "billow");
 }
@@ -132,9 +133,9 @@ ScalarField settled(const ScalarField& field) {
 
 void requirePositive(const ScalarField& field, const char* what) {
   const Interval range = field.range(Box::everywhere());
-  require(range.min > 0 && std::isfinite(range.max),
-          "cumuloLayers: " + std::string(what) + " must be > 0, got " +
-              std::to_string(range.min > 0 ? range.max : range.min));
+  require(range.min > 0 && std::isfinite(range.max), "cumuloLayers: " + std::string(what) +
+                                                         " must be > 0, got " +
+                                                         numberText(range.min > 0 ? range.max : range.min));
 }
 
 }  // namespace

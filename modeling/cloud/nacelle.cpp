@@ -22,6 +22,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/calculus.h"
 #include "nephele/modeling/field/operations.h"
 
@@ -223,7 +224,7 @@ class NacelleNode final : public FieldNode<Vec3f> {
 std::shared_ptr<const NacelleNode> nacelleNode(const ScalarField& object, const ScalarField& reference,
                                                const NacelleOptions& options) {
   const auto refuse = [](const char* what, const std::string& allowed, double value) {
-    return std::string("nacelle: ") + what + " must be " + allowed + ", got " + std::to_string(value);
+    return std::string("nacelle: ") + what + " must be " + allowed + ", got " + numberText(value);
   };
   require(options.steps >= 1 && options.steps <= kMostSteps,
           refuse("steps", "1 to " + std::to_string(kMostSteps), options.steps));

@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 
 namespace nephele {
 namespace {
@@ -123,9 +124,9 @@ void projectToSurface(const FieldNode<float>& l, const PointBlock& points, const
 VectorField surfacePoint(const ScalarField& l, const SurfacePointOptions& options) {
   require(options.steps >= 0, "surfacePoint: steps must be >= 0, got " + std::to_string(options.steps));
   require(!options.voxel || (*options.voxel > 0 && std::isfinite(*options.voxel)),
-          "surfacePoint: voxel must be > 0 and finite, got " + std::to_string(options.voxel.value_or(0)));
+          "surfacePoint: voxel must be > 0 and finite, got " + numberText(options.voxel.value_or(0)));
   require(options.toleranceVoxels >= 0,
-          "surfacePoint: toleranceVoxels must be >= 0, got " + std::to_string(options.toleranceVoxels));
+          "surfacePoint: toleranceVoxels must be >= 0, got " + numberText(options.toleranceVoxels));
   return VectorField(std::make_shared<SurfacePointNode>(l.node(), options));
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/random_stream.h"
 
 namespace nephele {
@@ -20,7 +21,7 @@ constexpr double kMostTries = 1e6;
 void requireOptions(const GuideOptions& o) {
   require(o.count > 0, "guides: count must be > 0, got 0");
   require(o.sizeVariation >= 0 && o.sizeVariation <= 0.99f,
-          "guides: sizeVariation must be from 0 to 0.99, got " + std::to_string(o.sizeVariation));
+          "guides: sizeVariation must be from 0 to 0.99, got " + numberText(o.sizeVariation));
 }
 
 void varySizes(std::vector<WispGuide>& guides, const GuideOptions& options) {
@@ -78,9 +79,9 @@ class GuideAttributes {
     };
     if (!isFinite(g.position)) refuse("a position that is not finite");
     if (!(g.size > 0 && std::isfinite(g.size)))
-      refuse("the size " + std::to_string(g.size) + ", which must be > 0 and finite");
+      refuse("the size " + numberText(g.size) + ", which must be > 0 and finite");
     if (!(g.density >= 0 && std::isfinite(g.density)))
-      refuse("the density " + std::to_string(g.density) + ", which must be >= 0 and finite");
+      refuse("the density " + numberText(g.density) + ", which must be >= 0 and finite");
     if (!isFinite(g.color)) refuse("a colour that is not finite");
     if (!isFinite(g.velocity)) refuse("a velocity that is not finite");
   }

@@ -16,6 +16,7 @@
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/base/random_stream.h"
 #include "nephele/modeling/field/operations.h"
 
@@ -30,7 +31,7 @@ constexpr float kOffset = 512;
 constexpr float kLargeNoise = 2.2f;
 
 std::string shown(const Vec3f& v) {
-  return std::to_string(v.x) + "," + std::to_string(v.y) + "," + std::to_string(v.z);
+  return numberText(v.x) + "," + numberText(v.y) + "," + numberText(v.z);
 }
 
 void requireGuides(std::span<const WispGuide> guides, std::uint64_t first) {
@@ -41,9 +42,9 @@ void requireGuides(std::span<const WispGuide> guides, std::uint64_t first) {
     const WispGuide& g = guides[i];
     if (!isFinite(g.position)) refuse(i, "position must be finite, got " + shown(g.position));
     if (!(g.size > 0 && std::isfinite(g.size)))
-      refuse(i, "size must be > 0 and finite, got " + std::to_string(g.size));
+      refuse(i, "size must be > 0 and finite, got " + numberText(g.size));
     if (!(g.density >= 0 && std::isfinite(g.density)))
-      refuse(i, "density must be >= 0 and finite, got " + std::to_string(g.density));
+      refuse(i, "density must be >= 0 and finite, got " + numberText(g.density));
     if (!isFinite(g.color)) refuse(i, "color must be finite, got " + shown(g.color));
     if (!isFinite(g.velocity)) refuse(i, "velocity must be finite, got " + shown(g.velocity));
   }
@@ -52,7 +53,7 @@ void requireGuides(std::span<const WispGuide> guides, std::uint64_t first) {
 void requireOptions(const WispOptions& o) {
   const auto check = [](bool fits, const char* name, const char* allowed, float value) {
     if (!fits)
-      throw Error(std::string("wisps: ") + name + " must be " + allowed + ", got " + std::to_string(value));
+      throw Error(std::string("wisps: ") + name + " must be " + allowed + ", got " + numberText(value));
   };
   const auto share = [&](float value, const char* name) {
     check(value >= 0 && value <= 1, name, "from 0 to 1", value);

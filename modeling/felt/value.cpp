@@ -3,7 +3,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/printable.h"
@@ -17,12 +16,6 @@ constexpr double kMostCells = 2.1e9;
 
 bool isFinite(const Vec3d& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-std::string numberShown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
 }
 
 /// The shortest text that is read as the same number, with a point, so that it is no integer.
@@ -80,8 +73,8 @@ std::string arrayText(const Array& array, const Element& element, std::size_t mo
 std::string domainText(const Domain& domain) {
   const auto cells = domain.cells();
   return "a domain of " + std::to_string(cells.x) + " x " + std::to_string(cells.y) + " x " +
-         std::to_string(cells.z) + " cells from " + threeText(domain.origin, numberShown) + ", " +
-         threeText(domain.lengths, numberShown) + " long";
+         std::to_string(cells.z) + " cells from " + threeText(domain.origin, numberText) + ", " +
+         threeText(domain.lengths, numberText) + " long";
 }
 
 }  // namespace
@@ -114,13 +107,13 @@ Box Domain::bounds() const {
 void requireValid(const Domain& domain) {
   require(isFinite(domain.origin) && isFinite(domain.rotation), "a domain's place must be finite");
   const auto positive = [](const Vec3d& v) { return isFinite(v) && v.x > 0 && v.y > 0 && v.z > 0; };
-  require(positive(domain.lengths), "the lengths of a domain must be finite and above 0, not " +
-                                        threeText(domain.lengths, numberShown));
+  require(positive(domain.lengths),
+          "the lengths of a domain must be finite and above 0, not " + threeText(domain.lengths, numberText));
   require(positive(domain.cell), "the cells of a domain must be finite and longer than 0, not " +
-                                     threeText(domain.cell, numberShown));
+                                     threeText(domain.cell, numberText));
   double cells = 1;
   for (int axis = 0; axis < 3; ++axis) cells *= std::ceil(domain.lengths[axis] / domain.cell[axis]);
-  require(cells <= kMostCells, "a domain may have 2.1e+09 cells at most, not " + numberShown(cells));
+  require(cells <= kMostCells, "a domain may have 2.1e+09 cells at most, not " + numberText(cells));
 }
 
 Value converted(const Value& value, const Type& to) {
@@ -156,15 +149,15 @@ std::string shown(const Value& value, const Type& type) {
     case Kind::integer:
       return std::to_string(value.as<std::int64_t>());
     case Kind::number:
-      return numberShown(value.as<double>());
+      return numberText(value.as<double>());
     case Kind::boolean:
       return value.as<bool>() ? "true" : "false";
     case Kind::text:
       return value.as<std::string>();
     case Kind::vector:
-      return threeText(value.as<Vec3d>(), numberShown);
+      return threeText(value.as<Vec3d>(), numberText);
     case Kind::matrix:
-      return matrixText(value.as<Mat3f>(), numberShown);
+      return matrixText(value.as<Mat3f>(), numberText);
     case Kind::domain:
       return domainText(value.as<Domain>());
     case Kind::shape: {

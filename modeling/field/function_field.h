@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/constant_node.h"
 #include "nephele/modeling/field/field.h"
 
@@ -86,7 +87,7 @@ class FunctionNode final : public FieldNode<T> {
 template <class F, class T = std::decay_t<std::invoke_result_t<const F&, const Vec3f&>>>
 Field<T> functionField(F function, std::type_identity_t<FunctionOptions<T>> options = {}) {
   require(options.differenceStep > 0,
-          "functionField: differenceStep must be > 0, got " + std::to_string(options.differenceStep));
+          "functionField: differenceStep must be > 0, got " + numberText(options.differenceStep));
   return Field<T>(std::make_shared<detail::FunctionNode<T, F>>(std::move(function), std::move(options)));
 }
 

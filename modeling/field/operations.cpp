@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/constant_node.h"
 #include "nephele/modeling/field/detail/field_kernels.h"
 #include "nephele/modeling/field/detail/operation_ranges.h"
@@ -204,13 +205,13 @@ ScalarField max(const ScalarField& a, const ScalarField& b) {
 
 ScalarField blend(const ScalarField& a, const ScalarField& b, float radius) {
   require(radius > 0 && std::isfinite(radius),
-          "blend: radius must be > 0 and finite, got " + std::to_string(radius));
+          "blend: radius must be > 0 and finite, got " + numberText(radius));
   return binaryField(Binary::blend, a, b, {radius, 0});
 }
 
 ScalarField clamp(const ScalarField& f, float low, float high) {
   require(low <= high,
-          "clamp: low must not be above high, got " + std::to_string(low) + " and " + std::to_string(high));
+          "clamp: low must not be above high, got " + numberText(low) + " and " + numberText(high));
   return unaryField(Unary::clamp, f, {low, high});
 }
 
@@ -224,14 +225,14 @@ ScalarField mask(const ScalarField& l) {
 
 ScalarField mask(const ScalarField& l, float edgeThickness) {
   require(edgeThickness > 0 && std::isfinite(edgeThickness),
-          "mask: edgeThickness must be > 0 and finite, got " + std::to_string(edgeThickness));
+          "mask: edgeThickness must be > 0 and finite, got " + numberText(edgeThickness));
   return smoothstep(-0.5f * edgeThickness, 0.5f * edgeThickness, l);
 }
 
 ScalarField smoothstep(float low, float high, const ScalarField& f) {
   require(low < high && std::isfinite(low) && std::isfinite(high),
-          "smoothstep: low must be below high and both finite, got " + std::to_string(low) + " and " +
-              std::to_string(high));
+          "smoothstep: low must be below high and both finite, got " + numberText(low) + " and " +
+              numberText(high));
   return unaryField(Unary::smoothstep, f, {low, high});
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/constant_node.h"
 #include "nephele/modeling/field/detail/field_kernels.h"
 #include "nephele/modeling/field/operations.h"
@@ -178,7 +179,7 @@ Affine translation(const Vec3f& offset) {
 
 Affine scaling(float factor) {
   require(factor > 0 && std::isfinite(factor),
-          "scale: factor must be > 0 and finite, got " + std::to_string(factor));
+          "scale: factor must be > 0 and finite, got " + numberText(factor));
   return {Mat3f::scaling(factor), {}};
 }
 

@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/detail/spectral_noise.h"
 #include "nephele/modeling/noise/lattice_noise.h"
@@ -199,34 +200,33 @@ class CurlNode final : public FieldNode<Vec3f> {
 };
 
 void requireSpectrum(const SpectrumOptions& o) {
-  const auto shown = [](float v) { return std::to_string(v); };
   require(o.exponent >= -16 && o.exponent <= 16,
-          "noise: spectrum exponent must be from -16 to 16, got " + shown(o.exponent));
+          "noise: spectrum exponent must be from -16 to 16, got " + numberText(o.exponent));
   require(o.tile > 0 && std::isfinite(o.tile),
-          "noise: spectrum tile must be > 0 and finite, got " + shown(o.tile));
+          "noise: spectrum tile must be > 0 and finite, got " + numberText(o.tile));
   require(o.lowest > 0 && std::isfinite(o.lowest),
-          "noise: spectrum lowest must be > 0 and finite, got " + shown(o.lowest));
+          "noise: spectrum lowest must be > 0 and finite, got " + numberText(o.lowest));
   require(o.highest >= o.lowest && std::isfinite(o.highest),
-          "noise: spectrum highest must be at least lowest, " + shown(o.lowest) + ", and finite, got " +
-              shown(o.highest));
+          "noise: spectrum highest must be at least lowest, " + numberText(o.lowest) + ", and finite, got " +
+              numberText(o.highest));
   require(o.resolution >= 16 && o.resolution <= 512 && std::has_single_bit(unsigned(o.resolution)),
           "noise: spectrum resolution must be a power of two from 16 to 512, got " +
               std::to_string(o.resolution));
   require(4 * double(o.highest) * o.tile <= o.resolution,
-          "noise: spectrum resolution must be at least 4 highest tile, " + shown(4 * o.highest * o.tile) +
-              ", got " + std::to_string(o.resolution));
+          "noise: spectrum resolution must be at least 4 highest tile, " +
+              numberText(4 * o.highest * o.tile) + ", got " + std::to_string(o.resolution));
   require(std::floor(double(o.highest) * o.tile * (1 + 1e-6)) >=
               std::max(1.0, double(o.lowest) * o.tile * (1 - 1e-6)),
-          "noise: no wave between spectrum lowest, " + shown(o.lowest) + ", and highest, " +
-              shown(o.highest) + ", fits the tile of " + shown(o.tile));
+          "noise: no wave between spectrum lowest, " + numberText(o.lowest) + ", and highest, " +
+              numberText(o.highest) + ", fits the tile of " + numberText(o.tile));
 }
 
 Made make(const NoiseOptions& o) {
   const LatticeKind latticeKind = rowOf(o.kind).lattice;
   const float time = o.time.value_or(0.0f), period = o.period.value_or(0.0f);
-  require(std::isfinite(time), "noise: time must be finite, got " + std::to_string(time));
+  require(std::isfinite(time), "noise: time must be finite, got " + numberText(time));
   require(!o.period || (period > 0 && std::isfinite(period)),
-          "noise: period must be > 0 and finite, got " + std::to_string(period));
+          "noise: period must be > 0 and finite, got " + numberText(period));
   const PerlinOptions placing{
       .frequency = o.frequency, .seed = o.seed, .offset = o.offset, .rotation = o.rotation};
   const detail::PerlinLattice lattice = detail::drawnLattice(placing, "noise");

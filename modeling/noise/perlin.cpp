@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 #include "nephele/modeling/noise/detail/noise_kernels.h"
@@ -73,11 +74,11 @@ void requireFractal(const FractalSumOptions& o) {
   require(o.octaves >= 1 && o.octaves <= 32,
           "fractalSum: octaves must be from 1 to 32, got " + std::to_string(o.octaves));
   require(o.frequency > 0 && std::isfinite(o.frequency),
-          "fractalSum: frequency must be > 0 and finite, got " + std::to_string(o.frequency));
+          "fractalSum: frequency must be > 0 and finite, got " + numberText(o.frequency));
   require(o.lacunarity > 0 && std::isfinite(o.lacunarity),
-          "fractalSum: lacunarity must be > 0 and finite, got " + std::to_string(o.lacunarity));
+          "fractalSum: lacunarity must be > 0 and finite, got " + numberText(o.lacunarity));
   require(o.roughness >= 0 && std::isfinite(o.roughness),
-          "fractalSum: roughness must be >= 0 and finite, got " + std::to_string(o.roughness));
+          "fractalSum: roughness must be >= 0 and finite, got " + numberText(o.roughness));
   require(std::isfinite(o.frequency * std::pow(o.lacunarity, float(o.octaves - 1))),
           "fractalSum: frequency times lacunarity^(octaves - 1) must be finite");
 }
@@ -88,7 +89,7 @@ namespace detail {
 
 PerlinLattice drawnLattice(const PerlinOptions& options, const std::string& caller) {
   require(options.frequency > 0 && std::isfinite(options.frequency),
-          caller + ": frequency must be > 0 and finite, got " + std::to_string(options.frequency));
+          caller + ": frequency must be > 0 and finite, got " + numberText(options.frequency));
   Draw draw(options.seed);
   // Always drawn, so that giving one of the two does not change the other.
   const Mat3f drawnRotation = randomRotation(draw);

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/noise/noise_draw.h"
 
 namespace nephele {
@@ -210,16 +211,16 @@ class VaryingNoiseNode final : public FieldNode<float> {
 ScalarField noiseOfFrequency(const NoiseOptions& options, const ScalarField& frequency) {
   const Interval range = frequency.range(Box::everywhere());
   require(range.min > 0 && std::isfinite(range.max),
-          "noiseOfFrequency: frequency must be > 0 with a finite range, got " + std::to_string(range.min) +
-              " to " + std::to_string(range.max));
+          "noiseOfFrequency: frequency must be > 0 with a finite range, got " + numberText(range.min) +
+              " to " + numberText(range.max));
   NoiseOptions rung = options;
   rung.frequency = range.min;
   if (range.isPoint()) return noise(rung);
   const double ratio = double(range.max) / double(range.min);
   require(ratio <= double(kLargestFrequencyRatio),
           "noiseOfFrequency: the greatest frequency must be at most " +
-              std::to_string(int(kLargestFrequencyRatio)) + " times the least, got " +
-              std::to_string(range.min) + " to " + std::to_string(range.max));
+              std::to_string(int(kLargestFrequencyRatio)) + " times the least, got " + numberText(range.min) +
+              " to " + numberText(range.max));
   const int steps = std::max(1, int(std::ceil(std::log2(ratio) * kStepsPerOctave)));
   detail::Draw draw(options.seed + 0x7f4a7c15u);
   std::vector<NodePtr<float>> noises;

@@ -17,6 +17,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/noise/noise_draw.h"
 #include "nephele/modeling/shape/combinations.h"
@@ -346,7 +347,7 @@ std::string_view speciesName(CloudSpecies species) {
 
 CloudShape cloudShape(const CloudShapeOptions& options) {
   require(options.size > 0 && std::isfinite(options.size),
-          "cloudShape: size must be > 0 and finite, got " + std::to_string(options.size));
+          "cloudShape: size must be > 0 and finite, got " + numberText(options.size));
   require(std::size_t(options.species) < kProportions.size(), "cloudShape: there is no such species");
   const Proportions& proportions = kProportions[std::size_t(options.species)];
   return Assembly(Grower(proportions, options.seed).columns(), proportions.flatness, options.size).shape();

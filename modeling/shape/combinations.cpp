@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/operations.h"
 
 namespace nephele {
@@ -45,7 +46,7 @@ ScalarField cutout(const ScalarField& a, const ScalarField& b) {
 
 ScalarField shell(const ScalarField& l, float thickness) {
   require(thickness > 0 && std::isfinite(thickness),
-          "shell: thickness must be > 0 and finite, got " + std::to_string(thickness));
+          "shell: thickness must be > 0 and finite, got " + numberText(thickness));
   return 0.5f * thickness - abs(l);
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/field/calculus.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
@@ -83,7 +84,7 @@ Knife flatKnife(const BladePlane& blade) {
 
 Knife roughKnife(const BladePlane& blade, const RoughnessOptions& options) {
   require(std::isfinite(options.amplitude) && options.amplitude >= 0,
-          "roughKnife: amplitude must be >= 0, got " + std::to_string(options.amplitude));
+          "roughKnife: amplitude must be >= 0, got " + numberText(options.amplitude));
   const ScalarField height = memo(plane(blade.point, blade.normal));
   const FractalSumOptions octaves{.octaves = options.octaves,
                                   .frequency = 1.0f,
@@ -148,7 +149,7 @@ ScalarField pieceField(const ScalarField& shape, std::span<const Knife> knives, 
   require(code.sides.size() == knives.size(), "pieceField: the code has " +
                                                   std::to_string(code.sides.size()) + " sides for " +
                                                   std::to_string(knives.size()) + " knives");
-  require(std::isfinite(kerf) && kerf >= 0, "pieceField: the kerf must be >= 0, got " + std::to_string(kerf));
+  require(std::isfinite(kerf) && kerf >= 0, "pieceField: the kerf must be >= 0, got " + numberText(kerf));
   ScalarField piece = shape;
   for (std::size_t k = 0; k < knives.size(); ++k) {
     ScalarField knife = knives[k].field;

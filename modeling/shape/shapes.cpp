@@ -11,6 +11,7 @@
 #include <string>
 
 #include "nephele/modeling/base/error.h"
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/shape/detail/shape_kernels.h"
 
 namespace nephele {
@@ -157,7 +158,7 @@ ScalarField shapeField(ShapeKind kind, float size) {
 
 void requireSize(float value, const char* shape, const char* name) {
   require(value > 0 && value < 1e18f,
-          std::string(shape) + ": " + name + " must be > 0 and finite, got " + std::to_string(value));
+          std::string(shape) + ": " + name + " must be > 0 and finite, got " + numberText(value));
 }
 
 void requirePoint(const Vec3f& p, const char* shape, const char* name) {

@@ -137,7 +137,7 @@ TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
   EXPECT_EQ(error("sized.ply",
                   "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
                   "property float z\nproperty float radius\nend_header\n0 0 0 1\n1 0 0 -1\n"),
-            line("sized.ply", "guides: vertex 1 has the size -1.000000, which must be > 0 and finite"));
+            line("sized.ply", "guides: vertex 1 has the size -1, which must be > 0 and finite"));
 }
 
 TEST_F(WispsVerb, ScattersGuidesOnAMeshAndInsideIt) {

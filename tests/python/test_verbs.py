@@ -1,3 +1,4 @@
+import locale
 import os
 import pickle
 import signal
@@ -27,6 +28,31 @@ def pixels_of_png(data):
         assert zlib.crc32(data[at + 4:at + 8 + length]) == struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0]
         at += 12 + length
     return width, height, zlib.decompress(packed)
+
+
+class Locales(Case):
+    """Programs with windows take over the locale of their users."""
+
+    def setUp(self):
+        super().setUp()
+        before = locale.setlocale(locale.LC_NUMERIC)
+        try:
+            locale.setlocale(locale.LC_NUMERIC, "de_DE.UTF-8")
+        except locale.Error:
+            self.skipTest("there is no locale de_DE.UTF-8 here")
+        self.addCleanup(locale.setlocale, locale.LC_NUMERIC, before)
+
+    def test_with_commas_do_not_change_numbers(self):
+        options = dict(size=(16, 12), extinction=2.5, view="25.5,4.5", sky="0.1,0.2,0.3")
+        with_commas = nephele.render(fog_grid(), **options)
+        locale.setlocale(locale.LC_NUMERIC, "C")
+        np.testing.assert_array_equal(with_commas.array, nephele.render(fog_grid(), **options).array)
+
+    def test_with_commas_do_not_change_messages(self):
+        with self.assertRaisesRegex(nephele.Error, "got -1.5$"):
+            nephele.sphere((0, 0, 0), -1.5)
+        with self.assertRaisesRegex(nephele.Error, "--extinction: got '-2.5', allowed: a number from 0 to 1e"):
+            nephele.render(fog_grid(), extinction=-2.5)
 
 
 class Names(Case):

@@ -15,20 +15,10 @@ namespace {
 
 constexpr double kBrightest = 1e30;
 
-[[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& allowed) {
-  throw CLI::ValidationError(option, fmt::format("got '{}', allowed: {}", text, allowed));
-}
-
 void addMedium(CLI::App& app, PictureOptions& options) {
-  app.add_option_function<double>(
-         "--extinction",
-         [&options](double value) {
-           if (!(value >= 0 && value < 1e30))
-             refuse("--extinction", fmt::format("{:g}", value), "a number of at least 0");
-           options.extinction = float(value);
-         },
-         "Extinction per world unit where the density is 1.")
-      ->type_name("NUMBER")
+  addNumber(
+      app, "--extinction", 0, 1e30, [&options](double value) { options.extinction = float(value); },
+      "Extinction per world unit where the density is 1.")
       ->default_str("150 / longest side of the volume");
   addNumbers(
       app, "--albedo", "R,G,B", 3, 0, 1,
@@ -51,7 +41,7 @@ void addMedium(CLI::App& app, PictureOptions& options) {
            try {
              options.medium.phase = Phase::parse(text);
            } catch (const Error&) {
-             refuse("--phase", text, Phase::forms());
+             refuseValue("--phase", text, Phase::forms());
            }
          },
          "Where scattered light goes: Henyey-Greenstein with mean cosine G, Schlick's form, two "

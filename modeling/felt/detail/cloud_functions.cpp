@@ -1,3 +1,4 @@
+#include "nephele/modeling/base/printable.h"
 #include "nephele/modeling/cloud/advect.h"
 #include "nephele/modeling/cloud/cumulo.h"
 #include "nephele/modeling/cloud/density_profile.h"
@@ -96,7 +97,7 @@ void addCloudFunctions(Registry& r) {
         [](const V& velocity, const S& object, double retained) {
           if (!(retained >= 0 && retained <= 1))
             throw CallError(Code::outOfRange,
-                            "retained is " + std::to_string(retained) + ", and may be from 0 to 1");
+                            "retained is " + numberText(retained) + ", and may be from 0 to 1");
           return reflected(velocity, object, {.retained = static_cast<float>(retained)});
         });
   r.add("vectorfield traceback(vectorfield velocity, float dt, int steps = 1)",

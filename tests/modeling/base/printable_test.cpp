@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <clocale>
+#include <limits>
+#include <string>
+
 namespace nephele {
 namespace {
 
@@ -10,6 +14,24 @@ TEST(Printable, ControlCharactersAreSpelledAndLettersStay) {
   EXPECT_EQ(printable("Größe \xe9"), "Größe \xe9");
   EXPECT_EQ(printable("twelve chars", 12), "twelve chars");
   EXPECT_EQ(printable("thirteen char", 12), "thirteen ...");
+}
+
+TEST(NumberText, HasSixDigits) {
+  EXPECT_EQ(numberText(-1), "-1");
+  EXPECT_EQ(numberText(0.1f), "0.1");
+  EXPECT_EQ(numberText(1.0 / 3), "0.333333");
+  EXPECT_EQ(numberText(-1e-9), "-1e-09");
+  EXPECT_EQ(numberText(12345678), "1.23457e+07");
+  EXPECT_EQ(numberText(std::numeric_limits<double>::infinity()), "inf");
+}
+
+// Programs with windows take over the locale of their users, and Python's modules live in it.
+TEST(NumberText, HasAPointInLocalesWithCommas) {
+  const std::string before = std::setlocale(LC_NUMERIC, nullptr);
+  if (!std::setlocale(LC_NUMERIC, "de_DE.UTF-8")) GTEST_SKIP() << "there is no locale de_DE.UTF-8 here";
+  const std::string text = numberText(1.5);
+  std::setlocale(LC_NUMERIC, before.c_str());
+  EXPECT_EQ(text, "1.5");
 }
 
 TEST(Printable, FaultsInJsonAreToldWithoutTheLibrarysWords) {

@@ -109,7 +109,7 @@ const std::vector<Pair>& pairs() {
        "  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n"
        "  ... and 192 calls more"},
       {Code::failed, "scalarfield s = shell(sphere((0,0,0), 1), -1);",
-       "s.felt:1:17: error: shell: thickness must be > 0 and finite, got -1.000000\n"
+       "s.felt:1:17: error: shell: thickness must be > 0 and finite, got -1\n"
        "  scalarfield s = shell(sphere((0,0,0), 1), -1);\n"
        "                  ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~"},
   };
