@@ -55,10 +55,19 @@ int usageError(const std::string& who, const std::string& what) {
 
 int runWork(const std::string& who, ProgramRun& run, const CommonOptions& options,
             const std::function<void()>& work) {
-  try {
-    work();
+  const auto finish = [&] {
     run.finish();
     if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
+  };
+  try {
+    try {
+      work();
+    } catch (const SeveralErrors&) {
+      // They are of some of the files; what is in the others is known.
+      finish();
+      throw;
+    }
+    finish();
     require(std::cout.flush().good() && std::fflush(stdout) == 0, "the standard output could not be written");
     return 0;
   } catch (const Cancelled&) {
@@ -79,7 +88,6 @@ int runWork(const std::string& who, ProgramRun& run, const CommonOptions& option
     std::cerr << error.what() << '\n';
     return error.isOfScript() ? kUsage : kFailed;
   } catch (const SeveralErrors& errors) {
-    run.finish();
     for (const std::string& message : errors.messages()) printError(who, message);
   } catch (const std::exception& error) {
     run.finish();

@@ -25,10 +25,12 @@ void reportKnives(const Pieces& pieces, const CutKnives& knives, Run& run) {
                             [&](const auto& piece) { return side(piece) == side(pieces.pieces[0]); }))
       missing.push_back(knives.names[k]);
   }
+  // Where a part is left out, or a kerf takes it, the knife may have parted it.
+  const char* const ofWhat = pieces.slivers > 0 || knives.options.kerf > 0 ? " that is left" : "";
   if (missing.size() > 3)
-    run.note(fmt::format("{} of {} knives part nothing", missing.size(), knives.names.size()));
+    run.note(fmt::format("{} of {} knives part nothing{}", missing.size(), knives.names.size(), ofWhat));
   else
-    for (const std::string& name : missing) run.note(name + ": parts nothing");
+    for (const std::string& name : missing) run.note(fmt::format("{}: parts nothing{}", name, ofWhat));
 }
 
 nlohmann::json statistics(const Pieces& pieces) {

@@ -13,14 +13,7 @@ namespace {
 
 Box boxOfFile(const std::string& path) {
   if (!isVolumeFile(path)) return boundingBox(readPoints(path));
-  const VdbGrid grid = readScalarGrid(path);
-  Box box = activeBox(grid);
-  const VdbGridInfo info = describe(grid);
-  if (info.gridClass != VdbGridInfo::Class::levelSet || box.isEmpty()) return box;
-  // Active voxels reach as far beyond the surface as the distances do.
-  const Vec3f band{info.background, info.background, info.background};
-  const Box surface{box.min + band, box.max - band};
-  return surface.isEmpty() ? box : surface;
+  return contentBox(readScalarGrid(path));
 }
 
 }  // namespace

@@ -128,6 +128,7 @@ class Repl {
     const bool declares = felt::kindOf(firstWord) && text.find_first_of("([;") != firstWord.size();
     const bool isWhole = outline.last == ';' || outline.last == '}';
     const Named answer = session_.enter(!isWhole && (outline.isAssignment || declares) ? text + ";" : text);
+    for (const std::string& warning : session_.warnings()) std::fprintf(stderr, "%s\n", warning.c_str());
     if (answer.type.kind != Kind::nothing) tell("", answer);
   }
 

@@ -40,7 +40,7 @@ struct OpenVdbFunctions {
   decltype(&nephele::labelOf) labelOf;
   decltype(&nephele::metadataOf) metadataOf;
   decltype(&nephele::copyMetadata) copyMetadata;
-  decltype(&nephele::activeBox) activeBox;
+  decltype(&nephele::contentBox) contentBox;
   decltype(&nephele::vectorComponents) vectorComponents;
   decltype(&nephele::toVectorVoxels) toVectorVoxels;
   VdbValues (*valuesOf)(const VdbGrid&);

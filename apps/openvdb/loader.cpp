@@ -69,8 +69,8 @@ void copyMetadata(const VdbGrid& from, VdbGrid& to) {
   functions().copyMetadata(from, to);
 }
 
-Box activeBox(const VdbGrid& grid) {
-  return functions().activeBox(grid);
+Box contentBox(const VdbGrid& grid) {
+  return functions().contentBox(grid);
 }
 
 std::array<VdbGrid, 3> vectorComponents(const VdbGrid& grid) {

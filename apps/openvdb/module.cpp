@@ -15,7 +15,7 @@ const nephele::apps::OpenVdbFunctions nepheleOpenVdbFunctions{
     .labelOf = &nephele::labelOf,
     .metadataOf = &nephele::metadataOf,
     .copyMetadata = &nephele::copyMetadata,
-    .activeBox = &nephele::activeBox,
+    .contentBox = &nephele::contentBox,
     .vectorComponents = &nephele::vectorComponents,
     .toVectorVoxels = &nephele::toVectorVoxels,
     .valuesOf = &nephele::valuesOf,

@@ -33,11 +33,13 @@ std::string keyOf(const Mesh& shape, const CloudArguments& arguments, const Clou
   const Box box = run.box(boundingBox(shape));
   hash.addNumbers(std::span(&box, 1));
   const bool isMoving = arguments.noiseTime || !arguments.recipe.empty();
+  const int frame = arguments.asksForTime() ? run.frame().value_or(0) : 0;
   const float edge = options.edgeThickness.range(Box::everywhere()).max;
   return optionsDigest(
       *arguments.cache.app, kNotOfLayers,
-      fmt::format("{} {} {} {} {}", hash.text(), options.voxelSize, cloudEdgeReach(edge, options.voxelSize),
-                  run.longestSide(boundingBox(shape)), run.part && isMoving ? run.part->framesSinceFirst : 0),
+      fmt::format("{} {} {} {} {} {}", hash.text(), options.voxelSize,
+                  cloudEdgeReach(edge, options.voxelSize), run.longestSide(boundingBox(shape)),
+                  run.part && isMoving ? run.part->framesSinceFirst : 0, frame),
       run.files);
 }
 

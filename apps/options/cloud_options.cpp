@@ -86,15 +86,27 @@ Extent CloudArguments::extent(Run& run) const {
   return {box, double(box.longestSide())};
 }
 
-std::vector<std::string> CloudArguments::maskFiles() const {
-  std::vector<std::string> files;
-  for (const FieldValue* value : {&amplitude, &frequency, &lacunarity, &roughness, &billow, &billowScale})
-    files.insert(files.end(), value->files.begin(), value->files.end());
+std::vector<const FieldValue*> CloudArguments::valuesOfLayers() const {
+  std::vector<const FieldValue*> values{&amplitude, &frequency, &lacunarity,
+                                        &roughness, &billow,    &billowScale};
   for (const LayerRecipe& layer : recipe)
     for (const auto* value :
          {&layer.amplitude, &layer.frequency, &layer.billow, &layer.billowScale, &layer.mask})
-      if (*value) files.insert(files.end(), (*value)->files.begin(), (*value)->files.end());
+      if (*value) values.push_back(&**value);
+  return values;
+}
+
+std::vector<std::string> CloudArguments::maskFiles() const {
+  std::vector<std::string> files;
+  for (const FieldValue* value : valuesOfLayers())
+    files.insert(files.end(), value->files.begin(), value->files.end());
   return files;
+}
+
+bool CloudArguments::asksForTime() const {
+  return std::ranges::any_of(valuesOfLayers(), [](const FieldValue* value) {
+    return value->expression.find("time") != std::string::npos;
+  });
 }
 
 std::string CloudArguments::noiseOf(std::size_t index) const {

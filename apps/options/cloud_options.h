@@ -57,12 +57,15 @@ struct CloudArguments {
   Extent extent(Run& run) const;
   /// Files that the parameters of the layers are read from, beside the recipe.
   std::vector<std::string> maskFiles() const;
+  /// Whether one of them is an expression of the time.
+  bool asksForTime() const;
   /// What noise layer `index` has: "worley, 3 octaves".
   std::string noiseOf(std::size_t index) const;
 
  private:
   /// As typed, or those of the recipe; 0: as many as the voxels can show.
   int layerCount() const;
+  std::vector<const FieldValue*> valuesOfLayers() const;
   FieldValue variedAmplitude() const;
   FieldValue variedEdge() const;
 };

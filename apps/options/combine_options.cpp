@@ -61,6 +61,14 @@ Solids::Solids(const std::vector<std::string>& paths, const MeshRepairOptions& r
   }
 }
 
+Box Solids::boxOf(Combination combination) const {
+  if (combination == Combination::unionOf) return box_;
+  Box box = solids_.front().mesh.after.box;
+  if (combination == Combination::intersection)
+    for (const Solid& solid : solids_) box = box.intersection(solid.mesh.after.box);
+  return box;
+}
+
 std::optional<double> Solids::ownVoxelSize() const {
   const std::string& first = solids_.front().path;
   if (!isVolumeFile(first)) return std::nullopt;

@@ -31,6 +31,8 @@ class Solids {
 
   /// Of all together.
   const Box& box() const { return box_; }
+  /// What all of them can fill when they are one, or more.
+  Box boxOf(Combination combination) const;
   /// Of the first, if it is a level set.
   std::optional<double> ownVoxelSize() const;
   /// Vertices, triangles and volume of each, for statistics.

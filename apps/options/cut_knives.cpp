@@ -74,9 +74,9 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     if (!text.starts_with('=')) continue;
     run.begin("knife");
     result.names.push_back("expression " + text.substr(1));
-    const ScalarField blade =
-        evaluated("--knife", text.substr(1), {felt::Kind::scalarField}, namesOfPlace(0, a.seed), side)
-            .as<ScalarField>();
+    const ScalarField blade = evaluated("--knife", text.substr(1), {felt::Kind::scalarField},
+                                        namesOfPlace(double(run.frame().value_or(0)), a.seed), side)
+                                  .as<ScalarField>();
     knives.solids.push_back(solidOf(blade, text, box, result.voxelSize, result.options.kerf, run));
   }
   if (a.cellCount > 0) {

@@ -19,9 +19,18 @@ Mesh ShapeArguments::shape(const std::function<double(double)>& voxelSize, Run& 
   } else if (inputs.size() > 1) {
     const Solids solids(inputs, repair, subdivide, run);
     const double longestSide = run.longestSide(solids.box());
-    const VoxelGrid<float> level =
-        solids.combined(combine, {.voxelSize = voxelSize(longestSide)}, longestSide, run);
-    mesh = marchingCubes(*toBricks(level), 0.0f, run);
+    const auto combined = [&](double voxel) {
+      return marchingCubes(*toBricks(solids.combined(combine, {.voxelSize = voxel}, longestSide, run)), 0.0f,
+                           run);
+    };
+    // Voxels are those of the cloud, whose size may follow from what is left of the inputs: less than they
+    // are.
+    const Box most = solids.boxOf(combine.combination);
+    const double voxel = voxelSize(run.longestSide(most.isEmpty() ? solids.box() : most));
+    mesh = combined(voxel);
+    constexpr double kFiner = 0.99;
+    if (const double own = voxelSize(run.longestSide(boundingBox(mesh))); own < kFiner * voxel)
+      mesh = combined(own);
   } else {
     run.begin("read");
     RepairedMesh read = readShape(inputs[0], repair, run);

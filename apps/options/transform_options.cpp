@@ -57,7 +57,8 @@ Similarity TransformOptions::shift(const Box& box) const {
   Similarity result;
   if (place != Place::asIs && !box.isEmpty()) {
     result.shift -= Vec3d(box.center());
-    if (place == Place::ground) result.shift.y += double(box.center().y - box.min.y);
+    const int up = to == UpAxis::z ? 2 : 1;
+    if (place == Place::ground) result.shift[up] += double(box.center()[up] - box.min[up]);
   }
   result.shift += move;
   return result;

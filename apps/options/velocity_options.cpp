@@ -142,7 +142,7 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
   velocity.path = text;
 }
 
-VectorField VelocityArguments::field(double longestSide) const {
+VectorField VelocityArguments::field(double longestSide, double frame, int seedOfAll) const {
   if (source == Source::file) return readVelocity(path, grid);
   if (source == Source::constant) {
     Vec3f same;
@@ -151,8 +151,8 @@ VectorField VelocityArguments::field(double longestSide) const {
     return VectorField(same);
   }
   if (source == Source::expression)
-    return evaluated("--velocity", expression, {felt::Kind::vectorField},
-                     namesOfPlace(double(time.value_or(0.0f)), seed), longestSide)
+    return evaluated("--velocity", expression, {felt::Kind::vectorField}, namesOfPlace(frame, seedOfAll),
+                     longestSide)
         .as<VectorField>();
   double share = 0;
   for (int i = 0; i < octaves; ++i) share += std::pow(roughness, 2 * i);

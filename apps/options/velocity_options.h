@@ -29,9 +29,9 @@ struct VelocityArguments {
   /// Of the file: its path and the name of the grid, or "" to look for the usual ones.
   std::string path, grid;
 
-  /// The velocity around a shape of this longest side. @throws Error naming the file, or that it is too fast
-  /// for single precision.
-  VectorField field(double longestSide) const;
+  /// The velocity around a shape of this longest side; `frame` and `seedOfAll` are what an expression calls
+  /// time and seed. @throws Error naming the file, or that it is too fast for single precision.
+  VectorField field(double longestSide, double frame = 0, int seedOfAll = 0) const;
 };
 
 /// Reads `text`, the value of the option `name`. @throws CLI::ValidationError naming the option, the key and

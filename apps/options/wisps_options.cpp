@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nephele/levelset/cloud/attribute_field.h"
 #include "nephele/levelset/cloud/cloud.h"
 #include "nephele/levelset/io/point_io.h"
 #include "nephele/levelset/mesh/mesh_distance.h"
@@ -33,6 +34,29 @@ std::vector<WispGuide> inShape(WispsArguments::Shape shape, float size, const Gu
   return guidesInside(ellipsoid({0, 0, 0}, radii), {-radii, radii}, options);
 }
 
+/// Points where `guides` are, with what the vertices of `mesh` say at the nearest place of its surface.
+Mesh pointsAt(const std::vector<WispGuide>& guides, const Mesh& mesh, const Run& run) {
+  Mesh points;
+  std::vector<float> x, y, z;
+  for (const WispGuide& guide : guides) {
+    points.positions.emplace_back(guide.position);
+    x.push_back(guide.position.x), y.push_back(guide.position.y), z.push_back(guide.position.z);
+  }
+  for (const MeshAttribute& attribute : mesh.attributes)
+    if (attribute.domain == MeshAttribute::Domain::vertex)
+      points.attributes.push_back({attribute.name, MeshAttribute::Domain::vertex, attribute.width,
+                                   std::vector<float>(guides.size() * std::size_t(attribute.width))});
+  std::vector<float> values(guides.size());
+  for (const std::string& name : attributeNames(mesh)) {
+    attributeField(mesh, name, {}, run).eval({x, y, z}, values);
+    const AttributePart part = *attributePart(points, name);
+    MeshAttribute& target = points.attributes[part.attribute];
+    for (std::size_t i = 0; i < values.size(); ++i)
+      target.values[i * std::size_t(target.width) + std::size_t(part.component)] = values[i];
+  }
+  return points;
+}
+
 std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const GuideOptions& options,
                               Run& run) {
   const RepairedMesh repaired = namingFile(path, [&] { return repairMesh(mesh, {}, run); });
@@ -41,7 +65,7 @@ std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const G
   const double voxel = double(box.longestSide()) / kInsideResolution;
   const MeshDistanceOptions band{.voxelSize = voxel, .exteriorBand = 3 * voxel, .interiorBand = 3 * voxel};
   const ScalarField level = namingFile(path, [&] { return meshDistance(repaired.mesh, band, run); });
-  return guidesInside(level, box, options);
+  return guidesOnVertices(pointsAt(guidesInside(level, box, options), repaired.mesh, run), options);
 }
 
 }  // namespace
@@ -93,6 +117,8 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, c
   namingFile(input, [&] {
     require(std::isfinite(side), "wisps: they reach further than numbers of 32 bits can hold");
   });
+  if (!(side > 0) && (voxelSize.value == 0 || voxelSize.relative))
+    throw CLI::ValidationError("--voxel-size", "all dots lie in one place; give a length in world units");
   DotVolumeOptions& d = result.dots;
   d.voxelSize = float(voxelSize.value > 0 ? voxelSize.worldUnits(side) : side / resolution);
   // An input is named by itself.
@@ -122,7 +148,7 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, c
   if (velocity) {
     VelocityArguments v = *velocity;
     v.grid = velocityGrid;
-    result.velocity = v.field(side);
+    result.velocity = v.field(side, double(run.frame().value_or(0)), seed);
   }
   return result;
 }

@@ -43,7 +43,8 @@ void carry(const AdvectArguments& arguments, Run& run) {
     run.note(
         fmt::format("{}: grid {} is left out: only numbers and vectors are carried", arguments.input, grid));
   if (!arguments.continueFrom.empty()) options.startMap = readFlowMap(arguments.continueFrom);
-  const VectorField velocity = arguments.velocity.field(run.longestSide(input.box));
+  const VectorField velocity =
+      arguments.velocity.field(run.longestSide(input.box), double(run.frame().value_or(0)));
   run.requireMemory(
       namingFile(arguments.input, [&] { return estimatedAdvectionBytes(input.bricks, options); }),
       "use a larger --map-coarseness, or larger voxels in the input");

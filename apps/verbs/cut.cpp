@@ -28,8 +28,11 @@ void cut(const CutArguments& arguments, Run& run) {
   if (arguments.geometry == CutArguments::Geometry::levelset) addLevelSets(parts, knives.voxelSize, run);
   const Pieces pieces = arguments.cut(parts, knives, run);
   if (pieces.pieces.empty())
-    throw Error(fmt::format("no piece is left: all {} parts are smaller than --min-volume, {:g} together",
-                            pieces.slivers, pieces.sliverVolume));
+    throw Error(
+        pieces.slivers == 0
+            ? "no piece is left: --kerf takes all of the model"
+            : fmt::format("no piece is left: all {} parts are smaller than --min-volume, {:g} together",
+                          pieces.slivers, pieces.sliverVolume));
   report(pieces, knives, run);
 
   run.begin("write");
@@ -40,10 +43,13 @@ void cut(const CutArguments& arguments, Run& run) {
     writePng(arguments.preview, picturePieces(pieces, picture, run), {}, run.metadata());
   }
   reportCrossings(crossings.get(), run);
-  run.result(fmt::format(
-      "{}: {} {}, volume {:g} (of {:g})", arguments.folder.empty() ? arguments.preview : arguments.folder,
-      pieces.pieces.size(), pieces.pieces.size() == 1 ? "piece: no knife parts the model" : "pieces",
-      pieces.volumeSum, pieces.volumeOriginal));
+  run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})",
+                         arguments.folder.empty() ? arguments.preview : arguments.folder,
+                         pieces.pieces.size(),
+                         pieces.pieces.size() > 1                        ? "pieces"
+                         : pieces.slivers > 0 || knives.options.kerf > 0 ? "piece"
+                                                                         : "piece: no knife parts the model",
+                         pieces.volumeSum, pieces.volumeOriginal));
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ std::vector<VdbGrid> turnedGrids(const TransformOptions& options) {
 
 Box boxOf(const std::vector<VdbGrid>& grids) {
   Box box;
-  for (const VdbGrid& grid : grids) box = box.including(activeBox(grid));
+  for (const VdbGrid& grid : grids) box = box.including(contentBox(grid));
   return box;
 }
 

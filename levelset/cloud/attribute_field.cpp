@@ -208,6 +208,13 @@ std::vector<std::string> attributeNames(const Mesh& mesh) {
   return names;
 }
 
+std::optional<AttributePart> attributePart(const Mesh& mesh, const std::string& name) {
+  for (const Part& part : partsOf(mesh))
+    if (part.name == name)
+      return AttributePart{std::size_t(part.attribute - mesh.attributes.data()), part.component};
+  return std::nullopt;
+}
+
 ScalarField attributeField(const Mesh& mesh, const std::string& name, const AttributeFieldOptions& options,
                            const Progress& progress) {
   requireTriangles(mesh);

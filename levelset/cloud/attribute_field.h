@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,15 @@ struct AttributeFieldOptions {
 /// four. Attributes of corners, as texture coordinates, are not among them: a vertex may have several values
 /// of these.
 std::vector<std::string> attributeNames(const Mesh& mesh);
+
+/// A number that vertices have: an attribute, by its place in the mesh's list, and which of its numbers.
+struct AttributePart {
+  std::size_t attribute = 0;
+  int component = 0;
+};
+
+/// What such a name stands for; nothing if the mesh has no such name.
+std::optional<AttributePart> attributePart(const Mesh& mesh, const std::string& name);
 
 /// A vertex attribute spread into space.
 ///

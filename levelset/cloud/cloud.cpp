@@ -28,7 +28,7 @@ Mesh surfaceOfLevelSet(const std::string& path, const Progress& progress) {
   const VdbGrid grid = readScalarGrid(path);
   const VdbGridInfo info = describe(grid);
   require(info.gridClass == VdbGridInfo::Class::levelSet,
-          path + ": grid '" + info.name + "' is not a level set; a cloud grows on a mesh or on a level set");
+          path + ": grid '" + info.name + "' is not a level set, which a shape must be if it is no mesh");
   Mesh mesh = marchingCubes(*toBricks(grid), 0.0f, progress);
   require(mesh.faceCount() > 0, path + ": grid '" + info.name + "' has no surface");
   return mesh;

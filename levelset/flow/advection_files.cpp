@@ -79,7 +79,7 @@ CarriedGrids carriedGrids(const std::vector<VdbGrid>& grids) {
       continue;
     }
     result.originals.push_back(grid);
-    if (const Box box = activeBox(grid); !box.isEmpty())
+    if (const Box box = contentBox(grid); !box.isEmpty())
       result.box = result.box.including(box.min).including(box.max);
   }
   if (!result.originals.empty()) requireWritable(result.originals);

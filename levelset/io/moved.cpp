@@ -50,11 +50,13 @@ openvdb::GridBase::Ptr withValuesOf(const openvdb::GridBase& grid, const Similar
   if (isStaggered && turns)
     throw Error(fmt::format(
         "grid {} is staggered: its components stand on the faces of voxels and cannot be turned", name));
+  const bool isNormals = isNormal(grid.getName()) || grid.getVectorType() == openvdb::VEC_COVARIANT_NORMALIZE;
   const bool isMotion = isStaggered || isVelocity(grid.getName()) ||
                         grid.getVectorType() == openvdb::VEC_CONTRAVARIANT_RELATIVE;
-  if (isMotion && (by.scale != 1 || turns)) {
+  if ((isMotion && by.scale != 1) || ((isMotion || isNormals) && turns)) {
+    const double scale = isMotion ? by.scale : 1;
     const auto turn = [&]<class T>(const openvdb::math::Vec3<T>& v) {
-      const Vec3d r = by.turned({double(v.x()), double(v.y()), double(v.z())}) * by.scale;
+      const Vec3d r = by.turned({double(v.x()), double(v.y()), double(v.z())}) * scale;
       return openvdb::math::Vec3<T>(T(r.x), T(r.y), T(r.z));
     };
     if (grid.isType<openvdb::Vec3SGrid>()) return changed<openvdb::Vec3SGrid>(grid, turn);

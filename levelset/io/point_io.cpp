@@ -59,31 +59,91 @@ std::optional<Vec3d> pointOf(const std::vector<std::string_view>& columns, const
   return p;
 }
 
-/// The columns that titles name as other programs do (x, P.x, pos_x, Points:0), or the first three.
-Axes axesOf(const std::vector<std::string_view>& titles) {
-  Axes axes{0, 1, 2};
+/// A title as names of attributes are: "v.x" is "vx".
+std::string nameOf(std::string_view title) {
+  std::string name;
+  for (const unsigned char c : title)
+    if (std::isalnum(c)) name += char(std::tolower(c));
+  return name;
+}
+
+/// The columns that titles name as other programs do (x, P.x, pos_x, Points:0), if there are all three.
+std::optional<Axes> axesOf(const std::vector<std::string_view>& titles) {
+  Axes axes{};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string letter(1, "xyz"[k]), digit(1, "012"[k]);
     const auto isOfAxis = [&](std::string_view title) {
-      std::string name;
-      for (const unsigned char c : title)
-        if (std::isalnum(c)) name += char(std::tolower(c));
+      const std::string name = nameOf(title);
       return name == letter ||
              std::ranges::any_of(
                  std::array<std::string, 5>{"p", "pos", "position", "point", "points"},
                  [&](const std::string& of) { return name == of + letter || name == of + digit; });
     };
     const auto found = std::ranges::find_if(titles, isOfAxis);
-    if (found == titles.end()) return {0, 1, 2};
+    if (found == titles.end()) return std::nullopt;
     axes[k] = std::size_t(found - titles.begin());
   }
   return axes;
 }
 
+/// The columns beside x, y and z, as attributes of one number each. One that is no number anywhere is left
+/// out.
+class OtherColumns {
+ public:
+  OtherColumns(const std::vector<std::string_view>& titles, const Axes& axes) {
+    for (std::size_t column = 0; column < titles.size(); ++column)
+      if (std::ranges::find(axes, column) == axes.end() && !nameOf(titles[column]).empty())
+        columns_.push_back({column, {nameOf(titles[column]), MeshAttribute::Domain::vertex, 1, {}}});
+  }
+
+  void add(const std::vector<std::string_view>& row) {
+    ++rows_;
+    for (Column& column : columns_)
+      if (const auto value = column.place < row.size() ? numberOf(row[column.place]) : std::nullopt)
+        column.attribute.values.push_back(float(*value));
+    std::erase_if(columns_, [&](const Column& column) { return column.attribute.values.size() < rows_; });
+  }
+
+  /// Colours of three columns are one attribute, as those of other files are.
+  std::vector<MeshAttribute> attributes() && {
+    const std::array<std::string, 3> colours[] = {
+        {"red", "green", "blue"}, {"r", "g", "b"}, {"cdr", "cdg", "cdb"}, {"colorr", "colorg", "colorb"}};
+    std::vector<MeshAttribute> result;
+    for (const auto& names : colours) {
+      std::array<const MeshAttribute*, 3> parts{};
+      for (std::size_t k = 0; k < 3; ++k)
+        for (const Column& column : columns_)
+          if (column.attribute.name == names[k]) parts[k] = &column.attribute;
+      if (std::ranges::find(parts, nullptr) != parts.end()) continue;
+      MeshAttribute color{"color", MeshAttribute::Domain::vertex, 3, {}};
+      for (std::size_t i = 0; i < parts[0]->values.size(); ++i)
+        for (const MeshAttribute* part : parts) color.values.push_back(part->values[i]);
+      result.push_back(std::move(color));
+      std::erase_if(columns_, [&](const Column& column) {
+        return std::ranges::find(names, column.attribute.name) != names.end();
+      });
+      break;
+    }
+    for (Column& column : columns_)
+      if (std::ranges::none_of(result, [&](const auto& a) { return a.name == column.attribute.name; }))
+        result.push_back(std::move(column.attribute));
+    return result;
+  }
+
+ private:
+  struct Column {
+    std::size_t place;
+    MeshAttribute attribute;
+  };
+  std::vector<Column> columns_;
+  std::size_t rows_ = 0;
+};
+
 Mesh readTable(const detail::MeshFile& file) {
   Mesh mesh;
   std::string_view rest = withoutByteOrderMark(file.bytes);
   Axes axes{0, 1, 2};
+  OtherColumns others({}, axes);
   bool isFirst = true;
   for (std::size_t line = 1; !rest.empty(); ++line) {
     const std::size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
@@ -92,14 +152,20 @@ Mesh readTable(const detail::MeshFile& file) {
     rest.remove_prefix(rest.starts_with("\r\n") ? 2 : std::min<std::size_t>(rest.size(), 1));
     const std::vector<std::string_view> columns = columnsOf(text);
     if (columns.empty() || columns[0].starts_with('#')) continue;
-    if (const auto p = pointOf(columns, axes))
+    if (const auto p = pointOf(columns, axes)) {
       mesh.positions.push_back(*p);
-    else if (isFirst && !numberOf(columns[0]))
-      axes = axesOf(columns);
-    else
+      others.add(columns);
+    } else if (isFirst && !numberOf(columns[0])) {
+      if (const auto titled = axesOf(columns)) {
+        axes = *titled;
+        others = OtherColumns(columns, axes);
+      }
+    } else {
       file.failAtLine(line, fmt::format("should be three numbers, found {}", detail::excerpt(text)));
+    }
     isFirst = false;
   }
+  mesh.attributes = std::move(others).attributes();
   return mesh;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "nephele/levelset/io/detail/openvdb_grid.h"
 #include "nephele/levelset/io/detail/vdb_check.h"
@@ -184,18 +185,95 @@ VdbValues valuesOf(const VdbGrid& grid) {
   return detail::valuesOf(*grid.impl().grid);
 }
 
-Box activeBox(const VdbGrid& grid) {
-  const openvdb::GridBase& base = *grid.impl().grid;
-  const openvdb::CoordBBox voxels = base.evalActiveVoxelBoundingBox();
-  Box box;
-  if (voxels.empty()) return box;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto p = base.transform().indexToWorld(openvdb::Vec3d(
-        corner & 1 ? voxels.max().x() : voxels.min().x(), corner & 2 ? voxels.max().y() : voxels.min().y(),
-        corner & 4 ? voxels.max().z() : voxels.min().z()));
-    box = box.including(Vec3f{float(p.x()), float(p.y()), float(p.z())});
+namespace {
+
+/// Grows a box by places of a grid.
+class PlacesBox {
+ public:
+  explicit PlacesBox(const openvdb::math::Transform& transform) : transform_(transform) {}
+
+  void include(const openvdb::Vec3d& index) {
+    const openvdb::Vec3d p = transform_.indexToWorld(index);
+    box_ = box_.including(Vec3f{float(p.x()), float(p.y()), float(p.z())});
   }
-  return box;
+  void includeCorners(const openvdb::CoordBBox& voxels) {
+    for (int corner = 0; corner < 8; ++corner)
+      include(openvdb::Vec3d(corner & 1 ? voxels.max().x() : voxels.min().x(),
+                             corner & 2 ? voxels.max().y() : voxels.min().y(),
+                             corner & 4 ? voxels.max().z() : voxels.min().z()));
+  }
+  const Box& box() const { return box_; }
+
+ private:
+  const openvdb::math::Transform& transform_;
+  Box box_;
+};
+
+/// The vertices of its marching cubes.
+template <class Grid>
+Box surfaceBox(const Grid& grid) {
+  PlacesBox places(grid.transform());
+  const auto accessor = grid.getConstAccessor();
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+    for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel)
+      for (int axis = 0; axis != 3; ++axis) {
+        openvdb::Coord next = voxel.getCoord();
+        ++next[axis];
+        const double from = double(*voxel), to = double(accessor.getValue(next));
+        if ((from < 0) == (to < 0)) continue;
+        openvdb::Vec3d place = voxel.getCoord().asVec3d();
+        place[axis] += from / (from - to);
+        places.include(place);
+      }
+  return places.box();
+}
+
+template <class Grid>
+Box voxelsBox(const Grid& grid) {
+  PlacesBox places(grid.transform());
+  for (auto value = grid.tree().cbeginValueOn(); value; ++value) {
+    openvdb::CoordBBox voxels;
+    value.getBoundingBox(voxels);
+    voxels.volume() == 1 ? places.include(voxels.min().asVec3d()) : places.includeCorners(voxels);
+  }
+  return places.box();
+}
+
+/// What `visit` makes of the grid as what it is; nothing for grids of other values than numbers and vectors.
+template <class Visit>
+std::optional<Box> visited(const openvdb::GridBase& grid, const Visit& visit) {
+  std::optional<Box> result;
+  using Grids =
+      openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid, openvdb::Vec3DGrid>;
+  grid.apply<Grids>([&](const auto& typed) { result = visit(typed); });
+  return result;
+}
+
+bool isAlongAxes(const openvdb::math::Transform& transform) {
+  const openvdb::Mat3d linear = detail::matrixOf(transform).getMat3();
+  for (int row = 0; row != 3; ++row)
+    for (int column = 0; column != 3; ++column)
+      if (row != column && linear(row, column) != 0) return false;
+  return true;
+}
+
+}  // namespace
+
+Box contentBox(const VdbGrid& grid) {
+  const openvdb::GridBase& base = *grid.impl().grid;
+  if (base.getGridClass() == openvdb::GRID_LEVEL_SET) {
+    std::optional<Box> surface;
+    if (base.isType<openvdb::FloatGrid>()) surface = surfaceBox(static_cast<const openvdb::FloatGrid&>(base));
+    if (base.isType<openvdb::DoubleGrid>())
+      surface = surfaceBox(static_cast<const openvdb::DoubleGrid&>(base));
+    if (surface && !surface->isEmpty()) return *surface;
+  }
+  if (base.transform().isLinear() && !isAlongAxes(base.transform()))
+    if (const auto box = visited(base, [](const auto& typed) { return voxelsBox(typed); })) return *box;
+  PlacesBox corners(base.transform());
+  if (const openvdb::CoordBBox voxels = base.evalActiveVoxelBoundingBox(); !voxels.empty())
+    corners.includeCorners(voxels);
+  return corners.box();
 }
 
 VdbGridInfo describe(const VdbGrid& handle) {

@@ -87,8 +87,9 @@ std::vector<VdbGrid> readVdbHeaders(const std::string& path);
 /// "it holds 'density' (float), 'v' (vec3s)": for messages.
 std::string listOf(const std::vector<VdbGrid>& grids);
 
-/// Around the active voxels of a grid, world units; empty if there are none.
-Box activeBox(const VdbGrid& grid);
+/// Around what a grid shows, world units: the surface of a level set, the centres of the active voxels of
+/// others; empty if there is nothing.
+Box contentBox(const VdbGrid& grid);
 
 /// Bricks of a scalar grid, `made` being told of them. A level set changes sign (positive inside); fog keeps
 /// its values.

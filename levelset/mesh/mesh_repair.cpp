@@ -93,13 +93,13 @@ class Ladder {
     result_.after = result_.repairs.empty() && result_.before.mergedVertices == 0 && source_.isTriangles()
                         ? result_.before
                         : diagnose(result_.mesh);
+    if (result_.after.closed() && isThin(result_.after)) failThin(result_.after);
     require(result_.after.closed() && result_.after.volume > 0,
             fmt::format("mesh repair: the mesh could not be closed{}; repair mode 'wrap' makes a closed "
                         "surface around it",
                         result_.after.problems().empty()
                             ? ", or holds nothing"
                             : fmt::format(" ({})", joined(result_.after.problems()))));
-    if (isThin(result_.after)) failThin(result_.after);
     if (result_.repairs.empty() && polygons.faceCount() > 0) result_.mesh = std::move(polygons);
     return std::move(result_);
   }
@@ -127,7 +127,8 @@ class Ladder {
   void repair() {
     const MeshDiagnosis& before = result_.before;
     if (before.closed()) {
-      if (isThin(before)) failThin(before);
+      // Volumes of parts of which one is inside out cancel each other.
+      if (before.components == 1 && isThin(before)) failThin(before);
       if (before.degenerateFaces > 0) dropDegenerates();
       const bool onePart = before.components == 1 && before.manifold();
       if (onePart && result_.repairs.empty() && !before.inward()) return;

@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -63,7 +64,10 @@ void judge(const Mesh& mesh, const VoxelGrid<float>& grid, double gridVolume, do
   const double surfaceVolume = detail::isosurfaceVolume(grid);
   const double gridError = std::abs(gridVolume / solid - 1),
                surfaceError = std::abs(surfaceVolume / solid - 1);
-  const double most = options.mostVolumeError, error = std::max(gridError, surfaceError);
+  const double error = std::max(gridError, surfaceError);
+  // Whoever allows all of it to be off wants to see what comes, which may be twice as much.
+  const double most =
+      options.mostVolumeError < 1 ? options.mostVolumeError : std::numeric_limits<double>::infinity();
   // Marching cubes cut off what is curved, too, which falls with the voxels and is no defect of the grid.
   if (error < most && gridError < kWorthANote && surfaceError < kSurfaceWorthANote) return;
   // The error of a shape that is thin for its voxels falls with the square of their size.

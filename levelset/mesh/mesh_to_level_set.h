@@ -12,7 +12,7 @@ struct MeshToLevelSetOptions {
   /// Band in voxels on either side of the surface, >= 1.
   double halfWidthVoxels = 3.0;
   /// Share of the mesh's volume by which that of the level set, or of the surface that marching cubes would
-  /// make of it, may be off. From a hundredth on there is a note.
+  /// make of it, may be off; 1: anything may come. From a hundredth on there is a note.
   double mostVolumeError = 0.1;
 };
 

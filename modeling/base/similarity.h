@@ -31,8 +31,12 @@ Similarity operator*(const Similarity& second, const Similarity& first);
 /// Whether values called so are velocities, which turn and scale with what they are on: v, vel or velocity.
 bool isVelocity(const std::string& name);
 
-/// The mesh elsewhere: vertex and corner attributes called normal, normals or N turn with it, velocities turn
-/// and are scaled; all others are as they were. @throws Error unless the mesh is valid.
+/// Whether values called so are normals, which turn with what they are on: n, N, normal or normals.
+bool isNormal(const std::string& name);
+
+/// The mesh elsewhere: normals turn with it, velocities turn and are scaled, those that are three attributes
+/// of one number, too (`nx`, `vel_y`, `v.z`, `v_0`); all others are as they were.
+/// @throws Error unless the mesh is valid.
 Mesh moved(Mesh mesh, const Similarity& by);
 
 }  // namespace nephele

@@ -23,6 +23,13 @@ bool hasErrors(const std::vector<Diagnostic>& diagnostics) {
                      [](const Diagnostic& diagnostic) { return diagnostic.severity == Severity::error; });
 }
 
+/// Where nobody would be told of slips they are faults.
+void requireNoSlips(std::vector<Diagnostic> diagnostics, const Sources& sources) {
+  if (diagnostics.empty()) return;
+  for (Diagnostic& diagnostic : diagnostics) diagnostic.severity = Severity::error;
+  throw ScriptError(std::move(diagnostics), sources);
+}
+
 /// Where an import stands is what its file says; a file that is imported twice says it once.
 class Loader {
  public:
@@ -213,7 +220,7 @@ ExpressionPtr Program::Parts::set(Interpreter& interpreter, Checker& scope, Sour
     expression = parseExpression(all, file, diagnostics);
     if (expression) scope.checkExpression(expression, type, diagnostics);
   }
-  if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), all);
+  requireNoSlips(std::move(diagnostics), all);
   interpreter.set(parameter->declared.slot, *expression);
   return expression;
 }
@@ -264,7 +271,7 @@ ExpressionText::ExpressionText(const std::string& name, std::string text, const 
   const int file = parts_->sources.add(name, std::move(text));
   parts_->expression = parseExpression(parts_->sources, file, diagnostics);
   if (parts_->expression) parts_->checker.checkExpression(parts_->expression, wanted, diagnostics);
-  if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), parts_->sources);
+  requireNoSlips(std::move(diagnostics), parts_->sources);
 }
 
 ExpressionText::~ExpressionText() = default;
@@ -290,6 +297,12 @@ struct Session::Parts {
   Interpreter interpreter;
   /// What was entered stays: functions point into it.
   std::vector<std::vector<StatementPtr>> entered;
+  std::vector<std::string> warnings;
+
+  void keepWarnings(const std::vector<Diagnostic>& diagnostics) {
+    if (hasErrors(diagnostics)) throw ScriptError(diagnostics, sources);
+    for (const Diagnostic& diagnostic : diagnostics) warnings.push_back(formatted(diagnostic, sources));
+  }
 };
 
 Session::Session(const Registry& registry, Context& context, const std::vector<Given>& given)
@@ -304,13 +317,14 @@ Session::~Session() = default;
 
 Named Session::enter(const std::string& text) {
   Sources& sources = parts_->sources;
+  parts_->warnings.clear();
   const int file = sources.add("line " + std::to_string(sources.count() + 1), text);
   // A text is an expression if it can be read as one; else what is wrong with it as statements is told.
   std::vector<Diagnostic> ofExpression;
   if (ExpressionPtr expression = parseExpression(sources, file, ofExpression)) {
     std::vector<Diagnostic> diagnostics;
     parts_->checker.checkExpression(expression, {}, diagnostics);
-    if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), sources);
+    parts_->keepWarnings(diagnostics);
     return tellingFaults(sources, [&] {
       parts_->interpreter.begin();
       return Named{"", expression->type, parts_->interpreter.evaluate(*expression)};
@@ -319,12 +333,16 @@ Named Session::enter(const std::string& text) {
   std::vector<Diagnostic> diagnostics;
   std::vector<StatementPtr> statements = Loader(sources, diagnostics).load(file);
   if (!hasErrors(diagnostics)) parts_->checker.check(statements, diagnostics, true);
-  if (hasErrors(diagnostics)) throw ScriptError(std::move(diagnostics), sources);
+  parts_->keepWarnings(diagnostics);
   parts_->entered.push_back(std::move(statements));
   return tellingFaults(sources, [&] {
     parts_->interpreter.run(parts_->entered.back());
     return Named{};
   });
+}
+
+const std::vector<std::string>& Session::warnings() const {
+  return parts_->warnings;
 }
 
 std::vector<std::string> Session::names() const {

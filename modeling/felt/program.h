@@ -91,7 +91,8 @@ class Program {
   std::unique_ptr<Parts> parts_;
 };
 
-/// A text that is one expression, as after `=` on the command line.
+/// A text that is one expression, as after `=` on the command line. Slips are faults in it, as in settings:
+/// nobody would be told.
 class ExpressionText {
  public:
   /// `wanted`: the type that its value is converted to. `name` is what messages call the text.
@@ -121,6 +122,8 @@ class Session {
   /// Carries out statements; a text that is one expression gives its value, others nothing.
   /// @throws ScriptError with all faults, after which the session can go on; Cancelled.
   Named enter(const std::string& text);
+  /// What was allowed in the text entered last but is likely a slip, as messages.
+  const std::vector<std::string>& warnings() const;
   /// Names of variables, for completion.
   std::vector<std::string> names() const;
 

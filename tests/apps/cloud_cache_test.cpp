@@ -1,4 +1,5 @@
 // cloud --cache, through the program.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -84,6 +85,23 @@ TEST_F(CloudCache, MakesLayersAnewWhereTheyAreOthers) {
   EXPECT_FALSE(isReused(""));
   // An edge that layers do not reach.
   EXPECT_FALSE(isReused("--edge-thickness 30%"));
+}
+
+TEST_F(CloudCache, MakesLayersAnewForAnotherTime) {
+  const auto isReusedAt = [&](int frame, const std::string& options) {
+    const ProgramResult result = runProgram(fmt::format(
+        "cloud {} -o {} --resolution 32 --layers 1 --cache {} --stats {} --frames {} {}", file("ball.obj"),
+        file("a.####.vdb"), file("cache"), file("s.####.json"), frame, options));
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    const auto stats = nlohmann::json::parse(textOf(file(fmt::format("s.{:04}.json", frame))));
+    return bool(stats["frames"][0]["cache"]["reused"]);
+  };
+  const std::string moving = "--amplitude '=1% * (1 + time)'";
+  EXPECT_FALSE(isReusedAt(1, moving));
+  EXPECT_FALSE(isReusedAt(2, moving));
+  EXPECT_TRUE(isReusedAt(2, moving));
+  EXPECT_FALSE(isReusedAt(1, ""));
+  EXPECT_TRUE(isReusedAt(2, ""));
 }
 
 TEST_F(CloudCache, MakesLayersAnewWhereTheMaskIsAnother) {

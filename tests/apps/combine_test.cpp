@@ -103,6 +103,12 @@ TEST_F(Combine, CloudsGrowOnTheUnion) {
   ASSERT_EQ(run("cloud", "a.obj b.obj", options + " --combine cutout").exitCode, 0);
   EXPECT_NEAR(signedVolume(readMesh(file("shape.obj"))), 4, 0.1);
   ASSERT_EQ(run("cloud", "a.obj b.obj", options + " --blend 5%").exitCode, 0);
+  // Voxels follow from what is left, not from what was taken off it far away.
+  ASSERT_EQ(run("cloud", "a.obj far.obj",
+                "--resolution 30 --layers 1 --amplitude 0 --combine cutout --shape-mesh " + file("shape.obj"))
+                .exitCode,
+            0);
+  EXPECT_NEAR(signedVolume(readMesh(file("shape.obj"))), 8, 0.1);
   // Kept layers know what they grew on.
   const std::string cache = options + " --cache " + file("cache");
   ASSERT_EQ(run("cloud", "a.obj b.obj", cache).exitCode, 0);

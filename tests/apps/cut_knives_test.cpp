@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -186,6 +187,37 @@ TEST_F(CutVerb, AMeshOrALevelSetIsAKnife) {
         EXPECT_NEAR(p["volume"], p["code"] == "+" ? half : 8 - half, 0.02 * half) << with << " " << geometry;
       }
     }
+}
+
+TEST_F(CutVerb, ExpressionsKnowTheFrameAndTheSeed) {
+  // Half of the box, of 2 x 2 x 2, is cut where x is 0.1 times the frame plus the seed.
+  const ProgramResult result = runProgram("cut " + box() + " -o " + file("k.####") +
+                                          " --knife '=P.x - 0.1*time - 0.01*seed' --seed 5 " +
+                                          "--frames 3 --resolution 64 --stats " + file("k.####.json"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  std::ifstream written(file("k.0003.json"));
+  const json made = json::parse(written)["frames"][0]["pieces"];
+  ASSERT_EQ(made.size(), 2u);
+  for (const json& p : made) {
+    const double wide = p["code"] == "+" ? 1 - 0.35 : 1 + 0.35;
+    EXPECT_NEAR(p["volume"], 4 * wide, 1e-3);
+  }
+}
+
+TEST_F(CutVerb, IntegersThatDivideToLessAreRefusedInExpressions) {
+  const ProgramResult result = runProgram("cut " + box() + " -o " + file("pieces") + " --knife '=P.x - 1/2'");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_NE(result.errors.find("1/2 of integers is 0"), std::string::npos) << result.errors;
+}
+
+TEST_F(CutVerb, SaysThatAPieceIsLeftOutAndNotThatAKnifeMissed) {
+  const ProgramResult result = cut(box() + " --plane 0.8,0,0,1,0,0 --min-volume 30%");
+  EXPECT_EQ(result.output.find("no knife parts"), std::string::npos) << result.output;
+  EXPECT_NE(result.errors.find("parts nothing that is left"), std::string::npos) << result.errors;
+  const ProgramResult all =
+      runProgram("cut " + box() + " -o " + file("none") + " --plane 0,0,0,1,0,0 --kerf 300%");
+  EXPECT_EQ(all.exitCode, 1);
+  EXPECT_NE(all.errors.find("--kerf takes all of the model"), std::string::npos) << all.errors;
 }
 
 TEST_F(CutVerb, AKnifeThatMissesLeavesOnePieceAndIsNamed) {

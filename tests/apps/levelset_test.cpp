@@ -131,6 +131,13 @@ TEST_F(LevelsetVerb, SaysWhatIsThinAndFailsWhereThatIsAskedFor) {
   EXPECT_EQ(thin.exitCode, 1);
   EXPECT_NE(thin.errors.find("its surface encloses"), std::string::npos) << thin.errors;
   EXPECT_EQ(run("--max-volume-error 0").exitCode, 2);
+  // Whoever wants to see what comes sees it, be it nothing.
+  writeMesh(folder_.file("plate.obj"), boxMesh({0, 0, 0}, {1, 0.02, 1}));
+  const ProgramResult seen =
+      runProgram("levelset " + folder_.file("plate.obj") + " -o " + folder_.file("plate.vdb") +
+                 " --resolution 40 --max-volume-error 100%");
+  EXPECT_EQ(seen.exitCode, 0) << seen.errors;
+  EXPECT_NE(seen.errors.find("the level set is not quite the mesh"), std::string::npos) << seen.errors;
   // A mesh that voxels hold says nothing.
   EXPECT_EQ(run("--resolution 200").errors, "");
 }

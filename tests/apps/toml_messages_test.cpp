@@ -281,7 +281,7 @@ TEST(TomlMessages, OfARunShowTheFile) {
           "              ^~~~~~~~~~~~~~~~~~~~~~~\n");
   // What is typed is shown as it was typed.
   EXPECT_TRUE(
-      messageOfRun("billow = '=1/2'\n", 2, " --billow '=1/(2 - 2)'").starts_with("--billow:1:1: error"));
+      messageOfRun("billow = '=0.5'\n", 2, " --billow '=1/(2 - 2)'").starts_with("--billow:1:1: error"));
   // In a frame of a sequence, too.
   std::ofstream(path) << "billow = '=1/(1 - 1)'\n";
   const ProgramResult frames = runProgram("cloud " + ownData("data/sphere_uv.obj") + " --resolution 24 -o " +

@@ -69,6 +69,29 @@ TEST_F(TransformVerb, MovesLevelSetsAndDensitiesWithoutResampling) {
   EXPECT_NEAR(density(Vec3f{2 * p.z, 2 * p.y + 3, -2 * p.x}), from(p), 1e-4f);
 }
 
+TEST_F(TransformVerb, PutsOnTheGroundWhatIsDownInTheOutput) {
+  std::ofstream(file("a.obj")) << "v 0 0 5\nv 2 0 5\nv 0 4 5\nv 0 0 6\nf 1 2 3\nf 1 2 4\n";
+  run(file("a.obj") + " -o " + file("b.obj") + " --up-axis z --to-up-axis z --place ground");
+  const Box box = boundingBox(readMesh(file("b.obj")));
+  EXPECT_EQ(box.min, (Vec3f{-1, -2, 0}));
+  EXPECT_EQ(box.max, (Vec3f{1, 2, 1}));
+}
+
+// A ball is as large however its voxels are turned, and ends where its surface is, not the band around it.
+TEST_F(TransformVerb, PlacesVolumesByWhatTheyShow) {
+  const float radius = 0.5f, voxel = 0.05f;
+  const auto level = bakeGrid(sphere({0.1f, 0.3f, 0}, radius),
+                              {.voxelSize = voxel, .box = {{-1, -1, -1}, {1, 1, 1}}, .band = {-0.3f, 0.3f}});
+  writeVdbFile(file("a.vdb"), {toVdb(*level, {"surface", VdbGridInfo::Class::levelSet})}, {});
+  for (const char* turn : {"0,0,0", "30,40,50"}) {
+    run(file("a.vdb") + " -o " + file("b.vdb") + " --place ground --rotate " + turn);
+    const Box box = contentBox(readScalarGrid(file("b.vdb")));
+    EXPECT_NEAR(box.min.y, 0, 1e-5) << turn;
+    EXPECT_NEAR(box.max.y, 2 * radius, 0.03 * radius) << turn;
+    EXPECT_NEAR(box.center().x, 0, 1e-5) << turn;
+  }
+}
+
 TEST_F(TransformVerb, RefusesWhatDoesNotFit) {
   std::ofstream(file("a.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const struct {

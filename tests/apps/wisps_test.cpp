@@ -119,6 +119,37 @@ TEST_F(WispsVerb, TakesOnePointWithASizeOfItsOwn) {
   EXPECT_NEAR(mass(file("w.vdb")) / (4.0 / 3 * M_PI * 0.125), 1, 1e-4);
 }
 
+TEST_F(WispsVerb, TakesColumnsOfTextAndVerticesAroundAVolume) {
+  std::ofstream(file("p.csv")) << "x,y,z,radius\n0,0,0,0.25\n3,0,0,0.25\n";
+  const ProgramResult text = wisps("t.vdb", file("p.csv") + kSmall + "--density 1");
+  ASSERT_EQ(text.exitCode, 0) << text.errors;
+  const double ball = 4.0 / 3 * M_PI * 0.015625;
+  EXPECT_NEAR(mass(file("t.vdb")) / (2 * ball), 1, 1e-4);
+  // Guides in a tetrahedron whose vertices all have a radius.
+  std::ofstream(file("m.ply"))
+      << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+         "property float z\nproperty float radius\nelement face 4\n"
+         "property list uchar int vertex_indices\nend_header\n"
+         "0 0 0 0.25\n4 0 0 0.25\n0 4 0 0.25\n0 0 4 0.25\n"
+         "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+  const ProgramResult volume = wisps("v.vdb", file("m.ply") + kSmall + "--density 1 --on volume --guides 3");
+  ASSERT_EQ(volume.exitCode, 0) << volume.errors;
+  EXPECT_NEAR(mass(file("v.vdb")) / (3 * ball), 1, 1e-4);
+}
+
+// The time of an expression is the frame, its seed is --seed.
+TEST_F(WispsVerb, ExpressionsOfVelocityKnowTimeAndSeed) {
+  const std::string still = " --amplitude 0 --displacement 0.01 --shutter 0.999,1 --guides 1 ";
+  const std::string point = pointsFile("p.ply", {"0 0 0 0.25"}, "property float radius\n");
+  ASSERT_EQ(wisps("w.####.vdb", point + kSmall + still + "--velocity '=(time,seed,0)' --seed 3 --frames 2-2")
+                .exitCode,
+            0);
+  const VdbGrid grid = readScalarGrid(file("w.0002.vdb"), "density");
+  const Box box = contentBox(grid);
+  EXPECT_NEAR(box.center().x, 2, 0.1);
+  EXPECT_NEAR(box.center().y, 3, 0.1);
+}
+
 TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
   const auto error = [&](const std::string& name, const std::string& text) {
     std::ofstream(file(name)) << text;

@@ -58,7 +58,7 @@ void useGrid(const VdbGrid& grid) {
   expect(info.indexMin.x <= info.indexMax.x || info.activeVoxels == 0, "active voxels without a box");
   if (info.activeVoxels > kMostVoxels || !isSmall(grid)) return;
   if (valuesOf(grid) == VdbValues::scalar)
-    succeeds("", [&] { sample(gridField(toBricks(grid)), activeBox(grid)); });
+    succeeds("", [&] { sample(gridField(toBricks(grid)), contentBox(grid)); });
   if (valuesOf(grid) == VdbValues::vector) {
     succeeds("", [&] {
       for (const VdbGrid& component : vectorComponents(grid)) toBricks(component);

@@ -44,7 +44,8 @@ void addGriddedCloudFunctions(Registry& r) {
       "frequency = 4.4x, scalarfield lacunarity = 2.1, scalarfield roughness = 0.55, scalarfield billow = 1, "
       "scalarfield billowscale = 1, string noise = \"perlin\", int seed = 0)",
       "The cloud that `nephele cloud` grows on a shape, as a level set: positive inside, no distance. Every "
-      "layer is sampled on a grid that suits it, for a result with voxels of that size. "
+      "layer is sampled on a grid that suits it, for a result with voxels of that size. The verb has other "
+      "defaults: a roughness of 0.65, a billow of 0.5, and an amplitude that varies. "
       "mask(cumulo(...), thickness) is its density.",
       "scalarfield cloud = cumulo(ls2shape(sphere((0,0,0), 1), 24), 0.1, 2, amplitude = 0.05, frequency = "
       "2);\n"

@@ -149,14 +149,23 @@ S distanceTo(const Context& context, const Shape& shape, double voxelSize, const
   return endingAt(level, boundingBox(solid).expanded(static_cast<float>(voxelSize)), 1);
 }
 
+/// A field is no distance, which the width of a cut is measured by: that from its surface is.
+Knife bladeOf(const S& field, const Mesh& solid, double voxel, float kerf, const Context& context) {
+  if (!(kerf > 0)) return field;
+  const auto samples = sampledBlade(field, boundingBox(solid), voxel, kerf, *context.progress);
+  const Mesh blade = marchingCubes(*samples, 0.0f, *context.progress);
+  return blade.faceCount() == 0 ? Knife{field} : solidKnife(blade, voxel, kerf, *context.progress);
+}
+
 std::vector<Value> cut(const Context& context, const Shape& shape, const Array& knives,
                        std::int64_t resolution, double kerf) {
   const int voxels = inRange("resolution", resolution, kFewestVoxels, kMostVoxels);
   const Mesh solid = solidOf(shape, context);
-  Knives blades;
-  for (const Value& knife : *knives) blades.fields.emplace_back(knife.as<S>());
   const double voxel = double(boundingBox(solid).longestSide()) / voxels;
   requireRoomForBand(solid, voxel, context);
+  Knives blades;
+  for (const Value& knife : *knives)
+    blades.fields.push_back(bladeOf(knife.as<S>(), solid, voxel, static_cast<float>(kerf), context));
   const auto level = toBricks(meshToLevelSet(solid, {.voxelSize = voxel}, *context.progress));
   CutOptions options;
   options.kerf = static_cast<float>(kerf);
@@ -178,6 +187,13 @@ ShapePtr withAttribute(const Shape& shape, const std::string& name, const S& f) 
     x[i] = p.x, y[i] = p.y, z[i] = p.z;
   }
   f.eval({x, y, z}, values);
+  if (const auto part = attributePart(shape.mesh, name)) {
+    MeshAttribute& attribute = result.mesh.attributes[part->attribute];
+    const auto width = std::size_t(attribute.width);
+    for (std::size_t i = 0; i < count; ++i)
+      attribute.values[i * width + std::size_t(part->component)] = values[i];
+    return std::make_shared<const Shape>(std::move(result));
+  }
   std::erase_if(result.mesh.attributes, [&](const MeshAttribute& old) { return old.name == name; });
   result.mesh.attributes.push_back({name, MeshAttribute::Domain::vertex, 1, std::move(values)});
   return std::make_shared<const Shape>(std::move(result));

@@ -95,7 +95,8 @@ void addDomains(Registry& r) {
   r.add(
       "domain domain(vector origin, vector lengths, vector rotation, float cellX, float cellY, float cellZ)",
       "A box with cells: its corner, its edges, a turn about the direction of `rotation` by its length in "
-      "radians, and the edges of a cell.",
+      "radians, and the edges of a cell. Cells keep their size: where an edge is no multiple of theirs, the "
+      "last ones, and with them samples, walls and periods, reach beyond it.",
       "domain d((-1,-1,-1), (2,2,2), (0,0,0), 0.1, 0.1, 0.1);",
       [](const Vec3d& origin, const Vec3d& lengths, const Vec3d& rotation, double x, double y, double z) {
         return checkedDomain({origin, lengths, rotation, {x, y, z}});

@@ -129,6 +129,16 @@ TEST(Points, AreReadFromText) {
     std::ofstream(folder.file("named.csv")) << text;
     EXPECT_EQ(readPoints(folder.file("named.csv")).positions, two) << text;
   }
+  std::ofstream(folder.file("titled.csv"))
+      << "id,P.x,P.y,P.z,pscale,v.x,Cd.r,Cd.g,Cd.b\nfirst,1,2,3,0.5,7,1,0,0\nlast,4,5,6,0.25,8,0,1,0\n";
+  const Mesh titled = readPoints(folder.file("titled.csv"));
+  EXPECT_EQ(titled.positions, two);
+  ASSERT_EQ(titled.attributes.size(), 3u);
+  EXPECT_EQ(titled.attributes[0].name, "color");
+  EXPECT_EQ(titled.attributes[0].values, (std::vector<float>{1, 0, 0, 0, 1, 0}));
+  EXPECT_EQ(titled.attributes[1].name, "pscale");
+  EXPECT_EQ(titled.attributes[1].values, (std::vector<float>{0.5f, 0.25f}));
+  EXPECT_EQ(titled.attributes[2].name, "vx");
   for (const char* bad : {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n",
                           "", "1,,2,3\n", "1 2 nan\n1 2 3\n", "x,y,z,w\n1,2\n"}) {
     std::ofstream(folder.file("bad.txt")) << bad;

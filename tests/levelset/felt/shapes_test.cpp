@@ -51,6 +51,28 @@ TEST(FeltShapes, OfMeshesAndCloudsHaveAnEndThatRangesShow) {
   EXPECT_GT(cloud.volume, 1.05 * kBall);
 }
 
+TEST(FeltShapes, AreCutAsWideAsAsked) {
+  // A slab of 0.2 is gone from the ball, whatever the knife's field is multiplied by: 2 (pi/3) h^2 (3 - h).
+  const double h = 0.9, left = 2 * 3.14159265358979 / 3 * h * h * (3 - h);
+  for (const std::string steepness : {"0.2", "1", "10"}) {
+    auto values = ran("shape[] p = cut(ls2shape(sphere((0,0,0), 1), 64), [" + steepness +
+                      " * identity().x], 64, 0.2);");
+    double volume = 0;
+    const Array pieces = values["p"].as<Array>();
+    ASSERT_EQ(pieces->size(), 2u) << steepness;
+    for (const Value& piece : *pieces) volume += diagnose(meshOf(piece)).volume;
+    EXPECT_NEAR(volume / left, 1, 5e-3) << steepness;
+  }
+}
+
+TEST(FeltShapes, KeepNumbersThatAreSetInAttributesOfSeveral) {
+  auto values =
+      ran("shape ball = ls2shape(sphere((0,0,0), 1), 16); shape a = setattribute(ball, \"color.r\", 0.25);\n"
+          "write(\"a.ply\", a); float r = eval(attribute(setattribute(a, \"color.r\", 0.75), \"color.r\"), "
+          "(0,1,0));");
+  EXPECT_NEAR(values["r"].as<double>(), 0.75, 1e-6);
+}
+
 TEST(FeltShapes, TakeNoNoticeOfHowSteepFieldsAre) {
   // Volume of a ball, whatever its field is multiplied by.
   for (const std::string steepness : {"1e-6", "1", "1000"}) {

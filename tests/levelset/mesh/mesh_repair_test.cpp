@@ -183,6 +183,17 @@ TEST(MeshRepair, InwardMeshIsTurned) {
   EXPECT_DOUBLE_EQ(repaired.after.volume, 1);
 }
 
+// As an export with a negative scale has it: the volumes add up to nothing.
+TEST(MeshRepair, APartThatIsTheOtherMirroredIsTurned) {
+  Mesh mesh;
+  addCube(mesh, {0, 0, 0}, 1);
+  addCube(mesh, {3, 0, 0}, 1, true);
+  EXPECT_NEAR(diagnose(mesh).volume, 0, 1e-12);
+  const RepairedMesh repaired = repairMesh(mesh);
+  EXPECT_EQ(repaired.repairs, std::vector<std::string>{"turned 1 of 2 parts outward"});
+  EXPECT_DOUBLE_EQ(repaired.after.volume, 2);
+}
+
 TEST(MeshRepair, OneTurnedFaceIsTurnedBack) {
   Mesh mesh = cube();
   std::swap(mesh.corners[5], mesh.corners[7]);

@@ -46,5 +46,32 @@ TEST(Similarity, TakesNormalsAndVelocitiesOfAMeshAlong) {
   EXPECT_NEAR(surfaceArea(result), 50, 1e-9);
 }
 
+// As tables of vertices have vectors: a column for each component.
+TEST(Similarity, TakesVectorsOfThreeAttributesAlong) {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.corners = {0, 1, 2};
+  mesh.faceStart = {0, 3};
+  const auto add = [&](const char* name, float value) {
+    mesh.attributes.push_back({name, MeshAttribute::Domain::vertex, 1, {value, value, value}});
+  };
+  add("nx", 0), add("ny", 0), add("nz", 1);
+  add("velocity_x", 0), add("velocity_y", 2), add("velocity_z", 0);
+  add("v_0", 0), add("v_1", 1), add("v_2", 0);
+  add("vx", 5), add("boxx", 7);
+  Similarity by = Similarity::rotation({90, 0, 0});
+  by.scale = 10;
+  const Mesh result = moved(mesh, by);
+  const auto value = [&](std::size_t attribute) { return result.attributes[attribute].values[2]; };
+  EXPECT_NEAR(value(1), -1, 1e-6);
+  EXPECT_NEAR(value(2), 0, 1e-6);
+  EXPECT_NEAR(value(4), 0, 1e-5);
+  EXPECT_NEAR(value(5), 20, 1e-5);
+  EXPECT_NEAR(value(8), 10, 1e-5);
+  // Without y and z it is no vector.
+  EXPECT_EQ(value(9), 5);
+  EXPECT_EQ(value(10), 7);
+}
+
 }  // namespace
 }  // namespace nephele
