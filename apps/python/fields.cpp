@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include <atomic>
 #include <cstring>
 #include <string_view>
 
@@ -21,6 +22,12 @@ using pybind11::literals::operator""_a;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// Points that a thread evaluates at a time, and those from which on interrupts are looked for.
 constexpr std::size_t kPiece = 2048, kMany = 100'000;
+/// Functions of Python that call each other through fields end here, before the stack of a thread does.
+constexpr int kDeepest = 20;
+
+/// Fields that are functions of Python: where there are none, threads that help need not know whose work it
+/// is.
+std::atomic<int> functionsOfPython{0};
 
 /// Points as rows of three floats, at any strides.
 struct Points {
@@ -95,10 +102,12 @@ void forPieces(const Points& points, Watch& watch, const Body& body) {
         },
         watch);
   };
-  if (points.count < kMany)
-    atOnce(watch, work);
-  else
+  if (points.count >= kMany)
     watched(watch, py::none(), work);
+  else if (points.count > kPiece && functionsOfPython > 0)
+    atOnceOnAllThreads(watch, work);
+  else
+    atOnce(watch, work);
 }
 
 /// Room for values that threads will write first.
@@ -252,8 +261,11 @@ class FunctionOfPython final : public FieldNode<T> {
   static constexpr int kLanes = kComponents<T>;
 
   FunctionOfPython(py::function function, float step, const RangeOf<T>& range)
-      : function_(new py::function(std::move(function))), step_(step), range_(range) {}
+      : function_(new py::function(std::move(function))), step_(step), range_(range) {
+    ++functionsOfPython;
+  }
   ~FunctionOfPython() override {
+    --functionsOfPython;
     // At the end of the program there is nobody to give it back to.
     if (!Py_IsInitialized()) return;
     const py::gil_scoped_acquire acquire;
@@ -265,6 +277,11 @@ class FunctionOfPython final : public FieldNode<T> {
     const Watch* watch = watchOfThisThread();
     if (watch && watch->cancelled()) return;
     const py::gil_scoped_acquire acquire;
+    if (watch && watch->depth() > kDeepest) {
+      PyErr_SetString(PyExc_RecursionError, "field: functions of Python call each other too deep");
+      keep(watch);
+      return;
+    }
     try {
       call(points, values);
     } catch (py::error_already_set& error) {

@@ -6,6 +6,7 @@
 
 #include "apps/python/values.h"
 #include "apps/python/watch.h"
+#include "nephele/levelset/io/memory_file.h"
 #include "nephele/levelset/mesh/marching_cubes.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
@@ -33,56 +34,58 @@ struct ArrayView {
   }
 };
 
-/// The samples of brick `brick` of an array whose first number is voxel `first`; false if all are background.
-bool gather(const ArrayView& array, const Vec3i& first, const Vec3i& brick, float background,
-            float* samples) {
-  bool isBackground = true;
+/// Whether a sample that brick `brick` stores differs from the background, `first` being the voxel of the
+/// array's first number. Those of its neighbours count: what is interpolated in its cells reads them.
+bool holdsAnything(const ArrayView& array, const Vec3i& first, const Vec3i& brick, float background) {
+  const Vec3i own = brick * kBrickSide - first, before{1, 1, 1}, behind{10, 10, 10};
+  const Vec3i low = max(own - before, {}), high = min(own + behind, array.size);
+  for (int z = low.z; z < high.z; ++z)
+    for (int y = low.y; y < high.y; ++y)
+      for (int x = low.x; x < high.x; ++x)
+        if (!(array.at(x, y, z) == background)) return true;
+  return false;
+}
+
+/// Writes the samples of its own.
+void fill(float* samples, const ArrayView& array, const Vec3i& first, const Vec3i& brick, float background) {
+  const Vec3i own = brick * kBrickSide - first;
   for (int z = 0; z < kBrickSide; ++z)
     for (int y = 0; y < kBrickSide; ++y)
       for (int x = 0; x < kBrickSide; ++x) {
-        const Vec3i at{brick.x * kBrickSide + x - first.x, brick.y * kBrickSide + y - first.y,
-                       brick.z * kBrickSide + z - first.z};
+        const Vec3i at = own + Vec3i{x, y, z};
         const bool isThere = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < array.size.x &&
                              at.y < array.size.y && at.z < array.size.z;
-        const float value = isThere ? array.at(at.x, at.y, at.z) : background;
-        isBackground &= value == background;
-        samples[(z * kBrickSide + y) * kBrickSide + x] = value;
+        samples[sampleOffset(x, y, z)] = isThere ? array.at(at.x, at.y, at.z) : background;
       }
-  return !isBackground;
 }
 
 std::shared_ptr<BrickGrid> bricksOf(const ArrayView& array, const Vec3i& first, const Lattice& lattice,
                                     float background, const Progress& progress) {
-  BrickBox places{brickOf(first), {}};
-  places.count = brickOf(first + array.size - Vec3i{1, 1, 1}) - places.first + Vec3i{1, 1, 1};
-  std::vector<std::int32_t> table(places.size());
+  // Bricks beside the array store samples of it, too.
+  BrickBox places{brickOf(first - Vec3i{2, 2, 2}), {}};
+  places.count = brickOf(first + array.size) - places.first + Vec3i{1, 1, 1};
+  std::vector<std::uint8_t> isHeld(places.size());
   parallelFor(
       places.size(), 64,
       [&](std::size_t begin, std::size_t end) {
-        float samples[kBrickSamples];
         for (std::size_t i = begin; i < end; ++i)
-          table[i] = gather(array, first, places.at(i), background, samples);
+          isHeld[i] = holdsAnything(array, first, places.at(i), background);
       },
       progress);
   auto grid = std::make_shared<BrickGrid>(lattice, places, background);
   std::vector<std::size_t> held;
-  for (std::size_t i = 0; i < table.size(); ++i)
-    if (table[i] != 0) held.push_back(i);
+  for (std::size_t i = 0; i < isHeld.size(); ++i)
+    if (isHeld[i] != 0) held.push_back(i);
   if (held.empty()) return grid;
   const std::int32_t start = grid->append(held.size());
   parallelFor(
       held.size(), 64,
       [&](std::size_t begin, std::size_t end) {
-        float samples[kBrickSamples];
         for (std::size_t i = begin; i < end; ++i) {
           const Vec3i brick = places.at(held[i]);
-          gather(array, first, brick, background, samples);
-          float* to = grid->brick(start + std::int32_t(i));
-          for (int z = 0; z < kBrickSide; ++z)
-            for (int y = 0; y < kBrickSide; ++y)
-              std::copy_n(samples + (z * kBrickSide + y) * kBrickSide, kBrickSide,
-                          to + sampleOffset(0, y, z));
-          grid->place(brick, start + std::int32_t(i));
+          const std::int32_t pool = start + std::int32_t(i);
+          fill(grid->brick(pool), array, first, brick, background);
+          grid->place(brick, pool);
         }
       },
       progress);
@@ -299,13 +302,30 @@ void writeGrids(const std::string& path, const std::vector<Self>& grids,
   });
 }
 
+/// The same values, which are not copied, under another name in files.
+Self renamed(const Self& self, const std::string& name) {
+  if (self->label().name == name) return self;
+  Self result;
+  Watch watch;
+  watched(watch, py::none(), [&] {
+    const MemoryFile file(name, ".vdb");
+    // Where OpenVDB keeps names.
+    writeVdbFile(file.path(), {self->vdb()}, {{"name", name}});
+    result = std::make_shared<PythonGrid>(MemoryFile::contentOf<std::vector<VdbGrid>>(file.path())->front());
+  });
+  return result;
+}
+
 }  // namespace
 
 PythonGrid::PythonGrid(VdbGrid grid)
     : label_(labelOf(grid)), isVector_(valuesOf(grid) == VdbValues::vector), vdb_(std::move(grid)) {}
 
 PythonGrid::PythonGrid(Bricks bricks, VdbGridLabel label)
-    : label_(std::move(label)), isVector_(bricks.size() == 3), bricks_(std::move(bricks)) {}
+    : label_(std::move(label)),
+      isVector_(bricks.size() == 3),
+      isMadeOfBricks_(true),
+      bricks_(std::move(bricks)) {}
 
 const VdbGrid& PythonGrid::vdb() {
   const std::lock_guard lock(mutex_);
@@ -411,6 +431,7 @@ void addGrids(py::module_& module) {
         return "<nephele.Grid '" + s->label().name + "', " + nameOf(s->label().gridClass) + ">";
       });
   module.def("_read_grids", readGrids, "path"_a);
+  module.def("_renamed", renamed, "grid"_a, "name"_a);
   module.def("_write_grids", writeGrids, "path"_a, "grids"_a, "metadata"_a);
 }
 

@@ -46,5 +46,6 @@ PYBIND11_MODULE(_nephele, module) {
   addFields(module);
   addWords(module);
   addVerbs(module);
+  addPickles(module);
   module.def("thread_count", &nephele::threadCount, "Threads that work runs on at most.");
 }

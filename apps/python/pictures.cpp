@@ -69,11 +69,18 @@ py::array screenOf(const Self& self, const std::string& view, double exposure,
   return viewOf(bytes->data(), {self->image.height, width, 3}, {3 * width, 3, 1}, bytes);
 }
 
+/// That of a picture which says nothing of one: at the origin, and no matrix of zeros.
+ImageCamera standardCamera() {
+  constexpr Mat44 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  return {kIdentity, kIdentity};
+}
+
 Self makePicture(const py::object& object, const std::optional<py::dict>& layers) {
   const Packed<float> array = packedFrom<float>(object, "picture");
   if (array.ndim() != 3 || array.shape(2) < 3 || array.shape(2) > 4 || array.size() == 0)
     throw py::value_error("picture: (height, width, 3 or 4) is needed, got " + shapeText(array));
   auto content = std::make_shared<ExrContent>();
+  content->camera = standardCamera();
   Image& image = content->image;
   image.height = int(array.shape(0));
   image.width = int(array.shape(1));
@@ -164,6 +171,8 @@ void addPictures(py::module_& module) {
     watched(watch, py::none(), [&] {
       content->image = readLinearImage(path);
       complete(content->image);
+      const bool isExr = path.ends_with(".exr") || path.ends_with(".EXR");
+      content->camera = (isExr ? readImageCamera(path) : std::nullopt).value_or(standardCamera());
     });
     return content;
   });

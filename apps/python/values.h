@@ -47,6 +47,8 @@ class PythonGrid {
 
   const VdbGridLabel& label() const { return label_; }
   bool isVector() const { return isVector_; }
+  /// Whether it was, and OpenVDB's form is made of them.
+  bool isMadeOfBricks() const { return isMadeOfBricks_; }
   /// In OpenVDB's form. @throws Error as toVdb.
   const VdbGrid& vdb();
   /// One, or three of a grid of vectors. @throws Error as toBricks.
@@ -57,7 +59,7 @@ class PythonGrid {
 
  private:
   VdbGridLabel label_;
-  bool isVector_ = false;
+  bool isVector_ = false, isMadeOfBricks_ = false;
   std::mutex mutex_;
   std::optional<VdbGrid> vdb_;
   std::vector<std::shared_ptr<const BrickGrid>> bricks_;
@@ -104,6 +106,7 @@ void addFields(py::module_& module);
 void addGrids(py::module_& module);
 void addMeshes(py::module_& module);
 void addPictures(py::module_& module);
+void addPickles(py::module_& module);
 void addWords(py::module_& module);
 void addVerbs(py::module_& module);
 

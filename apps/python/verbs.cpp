@@ -17,6 +17,7 @@
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/felt/diagnostic.h"
+#include "nephele/render/image/frame_range.h"
 #include "nephele/render/session/picture_stages.h"
 
 namespace nephele::python {
@@ -203,6 +204,8 @@ void addVerbs(py::module_& module) {
   py::class_<Kept, std::shared_ptr<Kept>>(module, "_Kept").def(py::init<>());
   module.def("_call_verb", callVerb, "verb"_a, "arguments"_a, "progress"_a,
              "kept"_a = std::shared_ptr<Kept>());
+  module.def("_frame_path",
+             [](const std::string& pattern, int frame) { return FramePattern::parse(pattern).path(frame); });
   module.def("_options", optionsOf);
   module.def("_verbs", verbNames);
   module.def("_read_mesh", [](const std::string& path) {

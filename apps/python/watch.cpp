@@ -10,28 +10,77 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <memory>
 #include <thread>
 
 namespace nephele::python {
 namespace {
 
-thread_local const Watch* watchHere = nullptr;
+/// Whose work it is, null once that has ended.
+using Owner = std::atomic<const Watch*>;
 
-/// Lets the threads of an arena know.
-class Announcer final : public tbb::task_scheduler_observer {
+thread_local std::shared_ptr<const Owner> ownerHere;
+
+/// Sets it for this thread, and afterwards as it was.
+class OwnerScope {
  public:
-  Announcer(tbb::task_arena& arena, const Watch& watch) : task_scheduler_observer(arena), watch_(watch) {
-    observe(true);
-  }
-  ~Announcer() override { observe(false); }
-  void on_scheduler_entry(bool) override { watchHere = &watch_; }
-  void on_scheduler_exit(bool) override { watchHere = nullptr; }
+  explicit OwnerScope(std::shared_ptr<const Owner> owner)
+      : before_(std::exchange(ownerHere, std::move(owner))) {}
+  ~OwnerScope() { ownerHere = std::move(before_); }
+  OwnerScope(const OwnerScope&) = delete;
+  OwnerScope& operator=(const OwnerScope&) = delete;
 
  private:
-  const Watch& watch_;
+  std::shared_ptr<const Owner> before_;
 };
 
+/// Lets the threads of an arena know. Those that leave it after the work are told of no exit: what they know
+/// outlives this, and says that the work has ended.
+class Announcer final : public tbb::task_scheduler_observer {
+ public:
+  Announcer(tbb::task_arena& arena, const Watch& watch)
+      : task_scheduler_observer(arena), owner_(std::make_shared<Owner>(&watch)) {
+    observe(true);
+  }
+  ~Announcer() override {
+    observe(false);
+    *owner_ = nullptr;
+  }
+  void on_scheduler_entry(bool) override { ownerHere = owner_; }
+  void on_scheduler_exit(bool) override { ownerHere.reset(); }
+
+ private:
+  std::shared_ptr<Owner> owner_;
+};
+
+void inArena(const Watch& watch, const std::function<void()>& work) {
+  tbb::task_arena arena;
+  const Announcer announcer(arena, watch);
+  arena.execute(work);
+}
+
+/// Does `work` in this thread and the threads that help it, and raises what went wrong.
+void hereAndNow(Watch& watch, const std::function<void()>& work) {
+  std::exception_ptr fault;
+  {
+    const OwnerScope scope(std::make_shared<Owner>(&watch));
+    const py::gil_scoped_release release;
+    try {
+      work();
+    } catch (...) {
+      fault = std::current_exception();
+    }
+  }
+  watch.report(py::none());
+  watch.throwPythonError();
+  if (fault) std::rethrow_exception(fault);
+}
+
 }  // namespace
+
+Watch::Watch() {
+  if (const Watch* around = watchOfThisThread()) depth_ = around->depth_ + 1;
+}
 
 void Watch::begin(std::string_view stage) const {
   const std::lock_guard lock(mutex_);
@@ -93,7 +142,7 @@ void Watch::report(const py::object& callback) {
 }
 
 const Watch* watchOfThisThread() {
-  return watchHere;
+  return ownerHere ? ownerHere->load() : nullptr;
 }
 
 void watched(Watch& watch, const py::object& callback, const std::function<void()>& work) {
@@ -106,9 +155,7 @@ void watched(Watch& watch, const py::object& callback, const std::function<void(
     const py::gil_scoped_release release;
     std::thread worker([&] {
       try {
-        tbb::task_arena arena;
-        const Announcer announcer(arena, watch);
-        arena.execute(work);
+        inArena(watch, work);
       } catch (...) {
         fault = std::current_exception();
       }
@@ -135,21 +182,11 @@ void watched(Watch& watch, const py::object& callback, const std::function<void(
 }
 
 void atOnce(Watch& watch, const std::function<void()>& work) {
-  const Watch* before = watchHere;
-  watchHere = &watch;
-  std::exception_ptr fault;
-  {
-    const py::gil_scoped_release release;
-    try {
-      work();
-    } catch (...) {
-      fault = std::current_exception();
-    }
-  }
-  watchHere = before;
-  watch.report(py::none());
-  watch.throwPythonError();
-  if (fault) std::rethrow_exception(fault);
+  hereAndNow(watch, work);
+}
+
+void atOnceOnAllThreads(Watch& watch, const std::function<void()>& work) {
+  hereAndNow(watch, [&] { inArena(watch, work); });
 }
 
 }  // namespace nephele::python

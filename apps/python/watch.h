@@ -22,6 +22,8 @@ namespace py = pybind11;
 /// stop, and what went wrong in a function of Python that it called.
 class Watch : public Progress {
  public:
+  Watch();
+
   /// A line for people, and how important it is, as Python's logging counts: 10 detail, 20 note, 30 warning.
   struct Message {
     int level;
@@ -39,6 +41,8 @@ class Watch : public Progress {
   void keepPythonError() const;
   /// Throws it, if there is one. Needs the GIL.
   void throwPythonError();
+  /// How many pieces of work wait for this one: functions of Python that they called asked for it.
+  int depth() const { return depth_; }
 
   /// Calls `callback(stage, fraction)` if that has changed, and Python's logging with messages. Needs the
   /// GIL.
@@ -53,6 +57,7 @@ class Watch : public Progress {
   mutable std::vector<std::string> stages_;
   mutable std::optional<py::error_already_set> error_;
   std::pair<std::string, double> reported_{"", -1};
+  int depth_ = 0;
 };
 
 /// The work that this thread is part of, or null.
@@ -63,7 +68,9 @@ const Watch* watchOfThisThread();
 /// callback, a function of Python that the work called, or an interrupt raises.
 void watched(Watch& watch, const py::object& callback, const std::function<void()>& work);
 
-/// The same in this thread, for what takes no time to speak of.
+/// The same in this thread, for what takes no time to speak of and calls functions of Python from here alone.
 void atOnce(Watch& watch, const std::function<void()>& work);
+/// Likewise for what calls them from the threads that help, too.
+void atOnceOnAllThreads(Watch& watch, const std::function<void()>& work);
 
 }  // namespace nephele::python

@@ -1,4 +1,5 @@
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -237,6 +238,36 @@ class Functions(Case):
                 nephele.field(function)(points)
         with self.assertRaisesRegex(KeyError, "mine"):
             nephele.field(function).bake(0.2, (-1,) * 3, (1,) * 3)
+
+    def test_work_in_threads_that_worked_for_others(self):
+        # Slow, so that other threads come to help.
+        def first(points):
+            time.sleep(1e-4)
+            return points[:, 0]
+
+        def failing(points):
+            time.sleep(1e-4)
+            raise KeyError("mine")
+
+        p = random_points(6000)
+        for _ in range(40):
+            BALL.bake(0.1, (-1,) * 3, (1,) * 3)
+            np.testing.assert_array_equal(nephele.field(first)(p), p[:, 0])
+            with self.assertRaisesRegex(KeyError, "mine"):
+                nephele.field(failing)(p)
+
+    def test_that_call_themselves_end(self):
+        endless = nephele.field(lambda q: endless(q))
+        around = nephele.field(lambda q: around(np.tile(q, (3000 // len(q), 1)))[:len(q)])
+        for points in (np.zeros(3), random_points(6000), random_points(200000)):
+            with self.assertRaisesRegex(RecursionError, "too deep"):
+                endless(points)
+        with self.assertRaisesRegex(RecursionError, "too deep"):
+            around(np.zeros(3))
+        nested = BALL
+        for _ in range(15):
+            nested = nephele.field(lambda q, inner=nested: inner(q))
+        self.assertEqual(nested((0, 0, 0)), 1)
 
     def test_that_return_nonsense_are_refused(self):
         p = random_points(10)

@@ -59,6 +59,32 @@ class Arrays(Case):
             np.testing.assert_array_equal(grid.to_array(), a)
             self.assertNear((grid.transform @ [*grid.voxel_box[0], 1])[:3], origin)
 
+    def test_fade_to_the_background_on_all_sides(self):
+        for first in (0, 1, 2, 3, 7, 8, -3, 0.3):
+            for size in (6, 7, 8, 9):
+                grid = nephele.Grid(np.ones((size,) * 3), 1, origin=(first,) * 3)
+                middle = first + 3
+                for axis in range(3):
+                    points = np.full((2, 3), middle, float)
+                    points[:, axis] = first - 0.5, first + size - 0.5
+                    self.assertNear(grid(points), (0.5, 0.5))
+                    self.assertNear(grid.field.gradient(points)[:, axis], (0.5, -0.5))
+        # So they do inside of an array.
+        a = np.zeros((40, 40, 40), np.float32)
+        a[16:24, 16:24, 16:24] = 1
+        self.assertNear(nephele.Grid(a)([(15.5, 18, 18), (23.5, 18, 18)]), (0.5, 0.5))
+
+    def test_are_the_same_once_read_again(self):
+        a = np.zeros((30, 30, 30), np.float32)
+        a[8:17, 5:24, 16:19] = numbers((9, 19, 3))
+        points = np.random.default_rng(1).uniform(0, 30, (20000, 3))
+        for first in (0, -5, 9):
+            grid = nephele.Grid(a, origin=(first,) * 3)
+            grid.save(self.path("a.vdb"))
+            again = nephele.read(self.path("a.vdb"))
+            np.testing.assert_array_equal(again(points + first), grid(points + first))
+            np.testing.assert_array_equal(again.field.gradient(points + first), grid.field.gradient(points + first))
+
     def test_have_a_background(self):
         a = np.full((10, 10, 10), -1, np.float32)
         a[4, 5, 6] = 2
@@ -157,6 +183,29 @@ class Shapes(Case):
         nephele.write(self.path("two.vdb"), [fog_grid(), ball_grid()])
         self.assertEqual(sorted(nephele.read(self.path("two.vdb"))), ["density", "surface"])
 
+    def test_are_named_by_the_keys_of_a_dict(self):
+        made = {"smoke": fog_grid(), "fire": nephele.Grid(numbers()), "v": nephele.Grid(numbers((3, 4, 5, 3)))}
+        nephele.write(self.path("named.vdb"), made)
+        again = nephele.read(self.path("named.vdb"))
+        self.assertEqual(list(again), list(made))
+        for name, grid in made.items():
+            self.assertEqual(again[name].name, name)
+            np.testing.assert_array_equal(again[name].to_array(grid.voxel_box), grid.to_array())
+            self.assertEqual(again[name].kind, grid.kind)
+        self.assertEqual([grid.name for grid in made.values()], ["density"] * 3)
+
+    def test_of_one_name_are_refused(self):
+        with self.assertRaisesRegex(nephele.Error, "density"):
+            nephele.write(self.path("same.vdb"), [fog_grid(), fog_grid()])
+        # Other programs write such files.
+        nephele.write(self.path("same.vdb"), {"aaaa": fog_grid(), "bbbb": fog_grid()})
+        with open(self.path("same.vdb"), "rb") as file:
+            content = file.read()
+        with open(self.path("same.vdb"), "wb") as file:
+            file.write(content.replace(b"bbbb", b"aaaa"))
+        with self.assertRaisesRegex(nephele.Error, "same.vdb: has two grids named 'aaaa'"):
+            nephele.read(self.path("same.vdb"))
+
     def test_bake_what_fits(self):
         with self.assertRaisesRegex(nephele.Error, "voxel_size must be > 0"):
             BALL.bake(0, (-1,) * 3, (1,) * 3)
@@ -182,14 +231,33 @@ class Files(Case):
 
 
 class Pickles(Case):
+    def assertKept(self, grid):
+        again = pickle.loads(pickle.dumps(grid))
+        self.assertEqual(again.voxel_box, grid.voxel_box)
+        self.assertEqual((again.name, again.kind, again.is_vector, again.voxel_size),
+                         (grid.name, grid.kind, grid.is_vector, grid.voxel_size))
+        np.testing.assert_array_equal(again.to_array(), grid.to_array())
+        np.testing.assert_array_equal(again.transform, grid.transform)
+        points = np.random.default_rng(1).uniform(-2, 10, (5000, 3))
+        np.testing.assert_array_equal(again(points), grid(points))
+        return again
+
     def test_of_grids_are_the_grids(self):
-        for grid in (fog_grid(), ball_grid(), nephele.Grid(numbers((5, 4, 3, 3)), name="v")):
-            again = pickle.loads(pickle.dumps(grid))
-            box = grid.voxel_box
-            # Level sets hold a band of three voxels, as files do.
-            band = 0.3 if grid.kind == "level set" else np.inf
-            np.testing.assert_array_equal(again.to_array(box), grid.to_array(box).clip(-band, band))
-            self.assertEqual((again.name, again.kind), (grid.name, grid.kind))
+        distances = 20 - np.linalg.norm(np.indices((40, 40, 40)).T - 20, axis=-1)
+        empty = np.zeros((20, 20, 20))
+        bordered = empty.copy()
+        bordered[9:12, 9, 9] = 1
+        for grid in (fog_grid(), ball_grid(), nephele.Grid(numbers((5, 4, 3, 3)), name="v"), nephele.Grid(bordered),
+                     nephele.Grid(distances, 0.1, origin=(0.13, 1, -2), kind="level set", name="surface"),
+                     nephele.Grid(empty), nephele.Grid(np.ones((3, 3, 3)), background=1),
+                     nephele.Grid(np.full((3, 3, 3), 1e6), half=True)):
+            self.assertKept(self.assertKept(grid))
+        self.assertEqual(self.assertKept(nephele.Grid(np.ones((3, 3, 3)), background=1, kind="unknown")).background, 1)
+
+    def test_of_grids_that_were_read_are_the_grids(self):
+        nephele.write(self.path("some.vdb"), [ball_grid(), fog_grid(), nephele.Grid(numbers((5, 4, 3, 3)), name="v")])
+        for grid in nephele.read(self.path("some.vdb")).values():
+            self.assertEqual(self.assertKept(grid).info(), grid.info())
 
     def test_of_fields_are_refused(self):
         with self.assertRaisesRegex(TypeError, "cannot be pickled"):

@@ -1,33 +1,18 @@
+import fractions
+import json
 import locale
 import os
-import pickle
 import signal
-import struct
 import subprocess
 import sys
 import threading
 import time
 import unittest
-import zlib
 
 import numpy as np
 
 import nephele
 from support import BALL, Case, ball_grid, cube, fog_grid
-
-
-def pixels_of_png(data):
-    """Size and bytes of a PNG that has no filters."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    width, height = struct.unpack(">II", data[16:24])
-    at, packed = 8, b""
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        if kind == b"IDAT":
-            packed += data[at + 8:at + 8 + length]
-        assert zlib.crc32(data[at + 4:at + 8 + length]) == struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0]
-        at += 12 + length
-    return width, height, zlib.decompress(packed)
 
 
 class Locales(Case):
@@ -125,8 +110,13 @@ class Objects(Case):
         self.assertTrue(all(piece["closed"] and abs(piece["mesh"].volume - 0.25) < 1e-6 for piece in pieces))
         self.assertEqual(len(stats["pieces"]), 4)
         listed = nephele.cut(nephele.Mesh(*cube()), plane=(0.5, 0.5, 0.5, 1, 0, 0), output=self.path("pieces"))
+        with open(self.path("pieces/pieces.json"), encoding="utf-8") as file:
+            self.assertEqual(listed, json.load(file)["pieces"])
         self.assertEqual(len(listed), 2)
-        self.assertTrue(os.path.exists(self.path("pieces/pieces.json")))
+        again, stats = nephele.cut(nephele.Mesh(*cube()), plane=(0.5, 0.5, 0.5, 1, 0, 0), output=self.path("pieces"), stats=True)
+        self.assertEqual((again, len(stats["pieces"])), (listed, 2))
+        several = nephele.cut(nephele.Mesh(*cube()), voronoi=3, wedge="seed=1,2", output=self.path("wedge"))
+        self.assertEqual(len(several["wedge"]), 2)
 
     def test_are_carried_and_transferred(self):
         fog = fog_grid()
@@ -157,6 +147,20 @@ class Objects(Case):
         paths = nephele.turntable(fog_grid(), frames="1-2", size=(32, 24), quality="draft", output=self.path("f.####.exr"))
         self.assertEqual([os.path.basename(path) for path in paths], ["f.0001.exr", "f.0002.exr"])
         self.assertTrue(all(os.path.exists(path) for path in paths))
+        pictures, stats = nephele.turntable(fog_grid(), frames=np.int64(3), size=(16, 12), quality="draft", stats=True)
+        self.assertEqual((len(pictures), len(stats["frames"])), (3, 3))
+
+    def test_turn_into_files_of_any_pattern(self):
+        grid = fog_grid()
+        os.mkdir(self.path("shot#1"))
+        for pattern, number in (("#", "101"), ("#####", "00101"), ("%03d", "101"), ("%05d", "00101"), ("%d", "101"), ("$F", "101"),
+                                ("$F3", "101"), ("$F4", "0101")):
+            path = self.path(f"shot#1/f.{pattern}.exr")
+            paths, stats = nephele.turntable(grid, frames="101", size=(16, 12), quality="draft", output=path, stats=True)
+            self.assertEqual([os.path.basename(path) for path in paths], [f"f.{number}.exr"])
+            self.assertTrue(os.path.exists(paths[0]), paths)
+            self.assertEqual(len(stats["frames"]), 1)
+            os.remove(paths[0])
 
 
 class Options(Case):
@@ -188,6 +192,23 @@ class Options(Case):
             nephele.cloud(self.path("none.obj"))
         with self.assertRaisesRegex(TypeError, "progress is True or a function"):
             nephele.cloud(mesh, progress=3)
+
+    def test_may_be_any_numbers(self):
+        options = dict(quality="draft", sun=(90, 38, 3))
+        wanted = nephele.render(fog_grid(), size=(32, 20), view=(30, 10), exposure=1, **options)
+        for number in (np.int64, np.uint8, np.float32, fractions.Fraction):
+            size = (32, 20) if number in (np.float32, fractions.Fraction) else (number(32), number(20))
+            found = nephele.render(fog_grid(), size=size, view=(number(30), 10), exposure=number(1), **options)
+            np.testing.assert_array_equal(found.array, wanted.array)
+        pieces = nephele.cut(nephele.Mesh(*cube()), plane=tuple(np.float32([0.5, 0.5, 0.5, 1, 0, 0])))
+        self.assertEqual(len(pieces), 2)
+
+    def test_name_grids_by_the_keys_of_a_dict(self):
+        grids = {"smoke": fog_grid(), "fire": nephele.Grid(np.ones((4, 4, 4)), 0.1)}
+        options = dict(size=(32, 20), quality="draft")
+        found = nephele.render(grids, grid="fire", **options)
+        np.testing.assert_array_equal(found.array, nephele.render(grids["fire"], **options).array)
+        self.assertEqual(list(nephele.transform(grids, scale=2)), ["smoke", "fire"])
 
     def test_of_several_calls_write_files(self):
         with self.assertRaisesRegex(TypeError, "give output, too"):
@@ -320,44 +341,6 @@ class Processes(Case):
         for thread in threads:
             thread.join()
         self.assertNear(made, [1 / (16 + 4 * i) for i in range(4)], 1e-4)
-
-
-class Pictures(Case):
-    def test_come_from_arrays(self):
-        a = np.random.default_rng(1).uniform(0, 1, (6, 9, 4)).astype(np.float32)
-        picture = nephele.Picture(a, {"Z": a[..., 0], "N": a[..., :3]})
-        np.testing.assert_array_equal(picture.array, a)
-        np.testing.assert_array_equal(picture.layers["Z"], a[..., 0])
-        again = pickle.loads(pickle.dumps(picture))
-        np.testing.assert_array_equal(again.array, a)
-        np.testing.assert_array_equal(again.layers["N"], a[..., :3])
-        for wrong in (a[0], a[..., :2], np.zeros((0, 3, 4))):
-            with self.assertRaises(ValueError):
-                nephele.Picture(wrong)
-        with self.assertRaises(ValueError):
-            nephele.Picture(a, {"Z": a[:3, :, 0]})
-
-    def test_are_saved_and_read(self):
-        a = np.random.default_rng(1).uniform(0, 1, (6, 9, 4)).astype(np.float16).astype(np.float32)
-        picture = nephele.Picture(a)
-        picture.save(self.path("p.exr"))
-        np.testing.assert_array_equal(nephele.read(self.path("p.exr")).array, a)
-        picture.save(self.path("p.png"), view="standard")
-        self.assertEqual(nephele.read(self.path("p.png")).array.shape, (6, 9, 4))
-        with self.assertRaisesRegex(nephele.Error, "unknown picture format"):
-            picture.save(self.path("p.jpg"))
-        with self.assertRaisesRegex(ValueError, "view must be"):
-            picture.save(self.path("p.png"), view="log")
-
-    def test_show_themselves(self):
-        picture = nephele.Picture(np.full((6, 9, 3), 0.18, np.float32))
-        width, height, rows = pixels_of_png(picture._repr_png_())
-        self.assertEqual((width, height), (9, 6))
-        screen = np.frombuffer(rows, np.uint8).reshape(6, 1 + 27)[:, 1:].reshape(6, 9, 3)
-        np.testing.assert_array_equal(screen, picture.screen())
-        for thing in (nephele.Mesh(*cube()), fog_grid(), ball_grid()):
-            self.assertGreater(len(thing._repr_png_()), 1000)
-        self.assertIsNone(nephele.Grid(np.ones((4, 4, 4, 3)))._repr_png_())
 
 
 class Sessions(Case):

@@ -497,7 +497,7 @@ def cut(
     overwrite: bool = ...,
 ) -> List[Dict[str, Any]]:
     """Cuts a model by knives; returns its pieces as dicts with name, code, volume, area, centroid, neighbours
-    and mesh. With output=FOLDER it writes them and returns what pieces.json lists.
+    and mesh. With output=FOLDER it writes them and returns what pieces.json lists of each.
 
     Options are those of `nephele cut --help-all`, with underscores, and nephele.options("cut") lists them:
     numbers,
@@ -620,7 +620,7 @@ def options(verb: str) -> Dict[str, Dict[str, Any]]:
 def read(path: Path) -> Any:
     """What is in a file: a Mesh (.obj .ply .stl .off .gltf .glb), a Grid or a dict of them by name (.vdb .nvdb),
     or a
-    Picture (.exr .png .hdr). Raises Error naming the path.
+    Picture (.exr .png .hdr). Raises Error naming the path, also where two grids have one name.
     """
     ...
 
@@ -727,7 +727,7 @@ def render(
     overwrite: bool = ...,
 ) -> Picture:
     """A Picture of a Grid, a path, a dict of grids or a list of such: R, G, B, A in .array, the layers of
-    aov=... in .layers.
+    aov=... in .layers. output=NAME.png writes it for the screen, as preview= does.
 
     Options are those of `nephele render --help-all`, with underscores, and nephele.options("render") lists
     them: numbers,
@@ -1026,9 +1026,8 @@ def words() -> List[str]:
     ...
 
 def write(path: Path, thing: Any) -> None:
-    """Writes a Mesh (.obj .ply .stl), a Grid, a dict or a list of them (.vdb), or a Picture (.exr .png); whole
-    or not
-    at all. Raises Error naming the path.
+    """Writes a Mesh (.obj .ply .stl), a Grid, a list of them or a dict by name (.vdb), or a Picture (.exr .png);
+    whole or not at all. Raises Error naming the path.
     """
     ...
 
@@ -1191,8 +1190,9 @@ def cumulo(base: Union[ScalarField, float], displacements: Sequence[Union[Scalar
 @overload
 def cumulo(s: Mesh, voxel: float, layers: int = ..., amplitude: Union[ScalarField, float] = ..., frequency: Union[ScalarField, float] = ..., lacunarity: Union[ScalarField, float] = ..., roughness: Union[ScalarField, float] = ..., billow: Union[ScalarField, float] = ..., billowscale: Union[ScalarField, float] = ..., noise: str = ..., seed: int = ...) -> ScalarField:
     """The cloud that `nephele cloud` grows on a shape, as a level set: positive inside, no distance. Every layer
-    is sampled on a grid that suits it, for a result with voxels of that size. mask(cumulo(...), thickness) is
-    its density.
+    is sampled on a grid that suits it, for a result with voxels of that size. The verb has other defaults: a
+    roughness of 0.65, a billow of 0.5, and an amplitude that varies. mask(cumulo(...), thickness) is its
+    density.
     """
     ...
 
@@ -1228,7 +1228,8 @@ def div(f: Union[VectorField, Vector]) -> ScalarField:
 @overload
 def domain(origin: Vector, lengths: Vector, rotation: Vector, cellX: float, cellY: float, cellZ: float) -> Domain:
     """A box with cells: its corner, its edges, a turn about the direction of `rotation` by its length in
-    radians, and the edges of a cell.
+    radians, and the edges of a cell. Cells keep their size: where an edge is no multiple of theirs, the last
+    ones, and with them samples, walls and periods, reach beyond it.
     """
     ...
 @overload

@@ -18,37 +18,47 @@ def _extension(path):
     return os.path.splitext(path)[1].lower()
 
 
-def grids_of(grids):
+def grids_of(grids, file):
     """One grid as it is, several as a dict by name."""
     if len(grids) == 1:
         return grids[0]
-    return {grid.name: grid for grid in grids}
+    named = {}
+    for grid in grids:
+        if grid.name in named:
+            raise Error(f"{file}: has two grids named '{grid.name}', and a dict holds one of each name")
+        named[grid.name] = grid
+    return named
+
+
+def named_grids(grids):
+    """The grids of a dict under the names that it gives them."""
+    return [_nephele._renamed(grid, name) for name, grid in grids.items()]
 
 
 def read(path):
     """What is in a file: a Mesh (.obj .ply .stl .off .gltf .glb), a Grid or a dict of them by name (.vdb .nvdb), or a
-    Picture (.exr .png .hdr). Raises Error naming the path."""
+    Picture (.exr .png .hdr). Raises Error naming the path, also where two grids have one name."""
     path = os.fsdecode(path)
     if _extension(path) in _VOLUMES:
         grids = _nephele._read_grids(path)
         if not grids:
             raise Error(f"{path}: no grid of numbers or vectors")
-        return grids_of(grids)
+        return grids_of(grids, path)
     if _extension(path) in _MESHES:
         return _nephele._read_mesh(path)
     return _nephele._read_picture(path)
 
 
 def write(path, thing):
-    """Writes a Mesh (.obj .ply .stl), a Grid, a dict or a list of them (.vdb), or a Picture (.exr .png); whole or not
-    at all. Raises Error naming the path."""
+    """Writes a Mesh (.obj .ply .stl), a Grid, a list of them or a dict by name (.vdb), or a Picture (.exr .png);
+    whole or not at all. Raises Error naming the path."""
     path = os.fsdecode(path)
     if isinstance(thing, Picture):
         thing.save(path)
     elif isinstance(thing, Grid):
         _nephele._write_grids(path, [thing], {})
     elif isinstance(thing, dict):
-        _nephele._write_grids(path, list(thing.values()), {})
+        _nephele._write_grids(path, named_grids(thing), {})
     elif isinstance(thing, list) and all(isinstance(item, Grid) for item in thing):
         _nephele._write_grids(path, thing, {})
     else:
@@ -149,7 +159,11 @@ def _reduced_mesh(self):
     return _restored_mesh, (self.V, self.corners, self.face_start, self.attributes, self.groups, self.name)
 
 
-def _restored_grid(data):
+def _grid_of_state(*state):
+    return _nephele._grid_of_state(state)
+
+
+def _grid_of_file(data):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "grid.vdb")
         with open(path, "wb") as file:
@@ -158,15 +172,22 @@ def _restored_grid(data):
 
 
 def _reduced_grid(self):
+    state = _nephele._state_of_grid(self)
+    if state is not None:
+        return _grid_of_state, state
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "grid.vdb")
         write(path, self)
         with open(path, "rb") as file:
-            return _restored_grid, (file.read(),)
+            return _grid_of_file, (file.read(),)
+
+
+def _picture_of_state(*state):
+    return _nephele._picture_of_state(state)
 
 
 def _reduced_picture(self):
-    return Picture, (self.array, self.layers)
+    return _picture_of_state, _nephele._state_of_picture(self)
 
 
 def _saved(self, path):

@@ -3,12 +3,16 @@
 import contextlib
 import difflib
 import functools
+import json
+import numbers
+import operator
 import os
+import shutil
 import tempfile
 
 from . import _nephele
 from ._nephele import Error, Grid, MatrixField, Mesh, Picture, ScalarField, VectorField
-from ._objects import PATHS, as_mesh, grids_of, read, write
+from ._objects import PATHS, as_mesh, grids_of, named_grids, read, write
 
 # What each output beside the main one is, for those that are asked for with True.
 _OUTPUTS = {"surface": ".vdb", "shape_mesh": ".ply", "map": ".vdb", "points": ".ply", "warp": ".vdb",
@@ -67,6 +71,16 @@ def _callback(progress):
         raise TypeError(f"progress is True or a function of (stage, fraction), not a {type(progress).__name__}")
 
 
+def _number(value):
+    """A number as it would be typed."""
+    return repr(int(value) if isinstance(value, numbers.Integral) else float(value))
+
+
+def _take_stats(named):
+    """Whether statistics are to be returned. A path of a file for them stays an option."""
+    return named.get("stats") is True and named.pop("stats")
+
+
 class _Call:
     """The arguments of one call, and the objects that stand for its files."""
 
@@ -86,7 +100,7 @@ class _Call:
         if isinstance(thing, Grid):
             return self._file(_nephele._file_of_grids(name, [thing]), name)
         if isinstance(thing, dict) and thing and all(isinstance(grid, Grid) for grid in thing.values()):
-            return self._file(_nephele._file_of_grids(name, list(thing.values())), name)
+            return self._file(_nephele._file_of_grids(name, named_grids(thing)), name)
         if isinstance(thing, Picture):
             return self._file(_nephele._file_of_picture(name, thing), name)
         if isinstance(thing, _FIELDS):
@@ -105,16 +119,17 @@ class _Call:
             return os.fsdecode(value)
         if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
             value = value.item()
-        if isinstance(value, (int, float)):
-            return repr(value)
+        if isinstance(value, numbers.Number):
+            return _number(value)
         if getattr(value, "ndim", None) == 2:
             return self.path(value, name)
         if hasattr(value, "tolist") and not isinstance(value, (Mesh, Grid, Picture)):
             value = value.tolist()
-        if isinstance(value, (tuple, list)) and all(isinstance(item, (int, float, str)) for item in value):
+        if isinstance(value, (tuple, list)) and all(
+                isinstance(item, (numbers.Number, str)) for item in value):
             # 640x480, but 1,2,3.
             mark = "x" if name == "size" else ","
-            return mark.join(item if isinstance(item, str) else repr(item) for item in value)
+            return mark.join(item if isinstance(item, str) else _number(item) for item in value)
         return self.path(value, name)
 
     def add_option(self, name, value):
@@ -157,10 +172,10 @@ class _Call:
             raise type(error)(text) from None
 
 
-def _content(file):
+def _content(file, name):
     content = file.content
     if isinstance(content, list) and content and isinstance(content[0], Grid):
-        return grids_of(content)
+        return grids_of(content, name)
     return content
 
 
@@ -169,9 +184,7 @@ def _made(verb, inputs, extension, named, *, name="output", before=(), session=N
     tuple."""
     progress = named.pop("progress", None)
     output = named.pop("output", None)
-    wants_stats = named.get("stats") is True
-    if wants_stats:
-        named.pop("stats")
+    wants_stats = _take_stats(named)
     several = next((name for name in ("frames", "wedge") if named.get(name)), None)
     if several and output is None:
         raise TypeError(f"{verb}: '{several}' makes several files; give output, too")
@@ -184,24 +197,30 @@ def _made(verb, inputs, extension, named, *, name="output", before=(), session=N
         call.arguments.append(f"--{option}={call.path(thing, what)}")
     for thing, what in inputs:
         call.add_input(thing, what)
-    others = []
+    output = None if output is None else os.fsdecode(output)
+    # Pictures for the screen are made by the verb, which knows how they are to look.
+    for_screen = verb == "render" and output is not None and output.lower().endswith(".png")
+    preview = named.setdefault("preview", output) if for_screen else None
+    others = {}
     for option, value in named.items():
         if value is True and option in _OUTPUTS and option in options(verb):
-            others.append(call.room(option, _OUTPUTS[option], option.replace("_", "-")))
+            others[option] = call.room(option, _OUTPUTS[option], option.replace("_", "-"))
         else:
             call.add_option(option, value)
     if several:
-        call.arguments.append("--output=" + os.fsdecode(output))
+        if not for_screen or preview != output:
+            call.arguments.append("--output=" + output)
         return call.run(progress, kept)
     if output is not None:
-        output = os.fsdecode(output)
         _nephele._try_output(output)
     main = call.room(name, extension, "output")
     statistics = call.run(progress, kept)
-    result = _content(main)
-    if output is not None:
+    result = _content(main, name)
+    if for_screen and preview != output:
+        shutil.copyfile(preview, output)
+    elif output is not None and not for_screen:
         write(output, result)
-    extras = [_content(file) for file in others] + ([statistics] if wants_stats else [])
+    extras = [_content(file, option) for option, file in others.items()] + ([statistics] if wants_stats else [])
     return (result, *extras) if extras else result
 
 
@@ -269,41 +288,38 @@ class Session:
 
 def cut(model, /, **named):
     folder = named.pop("output", None)
-    if folder is None:
-        return _made("cut", [(model, "model")], "", named, name="pieces")
+    if folder is None or named.get("wedge"):
+        return _made("cut", [(model, "model")], "", dict(named, output=folder), name="pieces")
     progress = named.pop("progress", None)
+    wants_stats = _take_stats(named)
     call = _Call("cut")
     call.add_input(model, "model")
-    for option, value in named.items():
+    for option, value in dict(named, output=folder).items():
         call.add_option(option, value)
-    call.arguments.append("--output=" + os.fsdecode(folder))
-    return call.run(progress)["pieces"]
+    statistics = call.run(progress)
+    with open(os.path.join(os.fsdecode(folder), "pieces.json"), encoding="utf-8") as file:
+        pieces = json.load(file)["pieces"]
+    return (pieces, statistics) if wants_stats else pieces
 
 
 def turntable(volumes, /, *, frames, output=None, progress=None, **named):
+    wants_stats = _take_stats(named)
     if output is None:
         with tempfile.TemporaryDirectory() as folder:
-            paths = turntable(volumes, frames=frames, output=os.path.join(folder, "frame.####.exr"),
-                              progress=progress, **named)
-            return [read(path) for path in paths]
-    if isinstance(frames, int):
-        frames = f"1-{frames}"
+            paths, statistics = turntable(volumes, frames=frames, output=os.path.join(folder, "frame.####.exr"),
+                                          progress=progress, stats=True, **named)
+            pictures = [read(path) for path in paths]
+            return (pictures, statistics) if wants_stats else pictures
+    if isinstance(frames, numbers.Integral):
+        frames = f"1-{operator.index(frames)}"
     call = _Call("turntable")
     for thing, name in _listed(volumes, "volume"):
         call.add_input(thing, name)
     for option, value in dict(named, frames=frames, output=output).items():
         call.add_option(option, value)
     statistics = call.run(progress)
-    digits = len(str(max((frame["frame"] for frame in statistics["frames"]), default=0)))
-    output = os.fsdecode(output)
-    return [_frame_path(output, frame["frame"], digits) for frame in statistics["frames"]]
-
-
-def _frame_path(pattern, frame, digits):
-    for mark, text in (("####", f"{frame:04d}"), ("%04d", f"{frame:04d}"), ("$F4", f"{frame:04d}")):
-        if mark in pattern:
-            return pattern.replace(mark, text)
-    return pattern.replace("#" * pattern.count("#"), f"{frame:0{max(digits, pattern.count('#'))}d}")
+    paths = [_nephele._frame_path(os.fsdecode(output), frame["frame"]) for frame in statistics.get("frames", [])]
+    return (paths, statistics) if wants_stats else paths
 
 
 _TEXTS = {
@@ -319,9 +335,9 @@ _TEXTS = {
     "transfer": "Carries texture coordinates and other attributes from the mesh `reference` to the mesh `object`; returns "
                 "`object` with them.",
     "render": "A Picture of a Grid, a path, a dict of grids or a list of such: R, G, B, A in .array, the layers of "
-              "aov=... in .layers.",
+              "aov=... in .layers. output=NAME.png writes it for the screen, as preview= does.",
     "cut": "Cuts a model by knives; returns its pieces as dicts with name, code, volume, area, centroid, neighbours and "
-           "mesh. With output=FOLDER it writes them and returns what pieces.json lists.",
+           "mesh. With output=FOLDER it writes them and returns what pieces.json lists of each.",
     "turntable": "The frames of a turn around volumes: a list of Pictures, or with output=\"DIR/NAME.####.exr\" the paths "
                  "of the files. frames is a number or 1-48.",
 }
