@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -20,6 +21,7 @@
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
 #include "nephele/render/image/png_io.h"
+#include "nephele/render/scene/backdrop.h"
 #include "nephele/render/session/picture_stages.h"
 
 namespace nephele::apps {
@@ -30,6 +32,10 @@ constexpr int kPoses = 5;
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void roundAsFile(Image::Channel& channel) {
+  for (float& value : channel.values) value = std::isnan(value) ? 0.0f : roundedToHalf(value);
 }
 
 // The part that one frame has in the progress of all.
@@ -70,6 +76,9 @@ class FrameMaker {
     isReady_ = true;
   }
 
+  const PictureOptions& picture() const { return scene_.picture(); }
+  Lights lights(int frame) const { return turntable_.lights(scene_.picture().lights, frame); }
+
   Camera camera(int frame) const {
     const Camera camera = turntable_.camera(start_, frame);
     const Shutter& shutter = scene_.picture().shutter;
@@ -88,13 +97,12 @@ class FrameMaker {
     if (picture.pathTraced) {
       PictureOptions own = picture;
       own.render.holdout = holdout;
-      own.lights = turntable_.lights(picture.lights, frame);
+      own.lights = lights(frame);
       if (picture.shutter.isInstant()) own.render.nextCamera = turntable_.camera(start_, frame + 1);
       return own.picture(scene_.volume(), camera, progress);
     }
-    const LitVolume& light =
-        makeLight(turntable_.lights(picture.lights, frame),
-                  turntable_.lightsMove() ? fmt::format("frame {}", frame) : "still", progress);
+    const LitVolume& light = makeLight(
+        lights(frame), turntable_.lightsMove() ? fmt::format("frame {}", frame) : "still", progress);
     RenderOptions options = picture.marched(camera);
     options.holdout = holdout;
     if (picture.shutter.isInstant()) options.nextCamera = turntable_.camera(start_, frame + 1);
@@ -157,8 +165,7 @@ class Reel {
 
   void addAsFile(Image image) {
     for (Image::Channel& channel : image.channels)
-      if (channel.half)
-        for (float& value : channel.values) value = std::isnan(value) ? 0.0f : roundedToHalf(value);
+      if (channel.half) roundAsFile(channel);
     add(image);
   }
 
@@ -177,6 +184,12 @@ class Reel {
   std::size_t place_ = 0;
 };
 
+void writePreview(const TurntableFrame& frame, const Image& image, const ViewTransform& screen,
+                  std::map<std::string, std::string> metadata) {
+  metadata[kPartDigest] = frame.previewDigest;
+  writePng(frame.preview, image, screen, metadata);
+}
+
 // Writes a frame while the next one is made, where more than one thread may run.
 class FrameWriter {
  public:
@@ -186,8 +199,11 @@ class FrameWriter {
   void write(const TurntableFrame& frame, RenderResult picture, const Camera& camera,
              std::map<std::string, std::string> metadata) {
     finish();
-    auto task = [this, &frame, camera, picture = std::move(picture), metadata = std::move(metadata)] {
-      PictureFiles{frame.path, frame.preview, frame.deep}.write(picture, camera, screen_, metadata);
+    auto task = [this, &frame, camera, picture = std::move(picture),
+                 metadata = std::move(metadata)]() mutable {
+      metadata[kPartDigest] = frame.digest;
+      PictureFiles{frame.path, "", frame.deep}.write(picture, camera, screen_, metadata);
+      if (!frame.preview.empty()) writePreview(frame, picture.image, screen_, std::move(metadata));
       if (frame.path.empty() && reel_.isWanted()) reel_.addAsFile(picture.image);
     };
     if (tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) == 1)
@@ -211,14 +227,28 @@ std::map<std::string, std::string> metadataOf(const PictureOptions& picture, con
   return metadata;
 }
 
-void makeReel(const TurntablePlan& plan, const TurntableOptions& options, Reel& reel, Run& run) {
+// Reads a frame as it is to be shown: whether it was written with a backdrop was up to another call.
+Image readShown(const TurntableFrame& frame, const FrameMaker& maker) {
+  Image image = readImage(frame.path);
+  const auto isBackdrop = [](const Image::Channel& channel) { return channel.name.starts_with("backdrop."); };
+  const bool hasBackdrop = std::ranges::any_of(image.channels, isBackdrop);
+  if (hasBackdrop && !maker.picture().backdrop) std::erase_if(image.channels, isBackdrop);
+  if (hasBackdrop || !maker.picture().backdrop) return image;
+  addBackdrop(image, maker.camera(frame.number), maker.lights(frame.number));
+  for (Image::Channel& channel : image.channels)
+    if (isBackdrop(channel)) roundAsFile(channel);
+  return image;
+}
+
+void makeReel(const TurntablePlan& plan, const TurntableOptions& options, const FrameMaker& maker, Reel& reel,
+              Run& run) {
   if (!reel.isWanted()) return;
   if (!options.output.empty()) {
     run.expect(0.95, 1.0);
     run.begin("movie");
     for (std::size_t i = 0; i != plan.frames.size(); ++i) {
       run.check();
-      reel.add(readImage(plan.frames[i].path));
+      reel.add(readShown(plan.frames[i], maker));
       run.advance(double(i + 1) / double(plan.frames.size()));
     }
   }
@@ -235,9 +265,10 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableS
   // The same for all volumes.
   const ViewTransform screen = scene.picture().screen;
   std::vector<TurntableFrame*> missing;
+  FrameMaker maker(scene, turntable, start, run);
   for (TurntableFrame& frame : plan.frames) {
     if (frame.skipped && !frame.preview.empty() && !frame.previewSkipped)
-      writePng(frame.preview, readImage(frame.path), screen, metadataOf(scene.picture(), run, frame.number));
+      writePreview(frame, readShown(frame, maker), screen, metadataOf(scene.picture(), run, frame.number));
     if (!frame.skipped) missing.push_back(&frame);
   }
   double marchSeconds = 0;
@@ -245,7 +276,6 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableS
   std::size_t notFinite = 0;
   Reel reel(options, int(plan.frames.size()), screen);
   FrameWriter writer(screen, reel);
-  FrameMaker maker(scene, turntable, start, run);
   const double end = reel.isWanted() && !options.output.empty() ? 0.95 : 1.0;
   // The stage of frames begins anew behind every new volume.
   std::size_t stageBegin = 0;
@@ -266,7 +296,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableS
       const auto holdout =
           frame.holdout.empty() ? nullptr : readHoldout(frame.holdout, camera, run.memoryLimitBytes);
       RenderResult result = maker.make(frame.number, camera, holdout, progress);
-      picture.addSky(result.image, camera, turntable.lights(picture.lights, frame.number));
+      picture.addSky(result.image, camera, maker.lights(frame.number));
       live.complete(result.image);
       // Also where a frame has no work that would ask.
       run.check();
@@ -274,7 +304,6 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableS
           frame.path.empty() ? fmt::format("{}: frame {}", options.name(), frame.number) : frame.path,
           result.image, run);
       auto metadata = metadataOf(picture, run, frame.number);
-      metadata[kPartDigest] = frame.digest;
       deepSamples += result.deep ? result.deep->sampleCount() : 0;
       marchSeconds += result.marchSeconds;
       rays += result.rays;
@@ -304,7 +333,7 @@ void makeFrames(TurntablePlan& plan, const TurntableOptions& options, TurntableS
     if (!frame.skipped) made["voxel_size"] = frame.voxelSize;
     run.stats["frames"].push_back(std::move(made));
   }
-  makeReel(plan, options, reel, run);
+  makeReel(plan, options, maker, reel, run);
 }
 
 }  // namespace nephele::apps

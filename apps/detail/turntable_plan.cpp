@@ -34,15 +34,14 @@ std::optional<FramePattern> patternOf(const std::string& option, const std::stri
   return parsed(option, [&] { return FramePattern::parse(text); });
 }
 
-// What the linear pixels of a frame do not depend on, or only by its number.
-constexpr std::string_view kNotOfPictures[]{"frames",         "fps",         "only",      "shard", "exposure",
-                                            "view-transform", "ocio-config", "background"};
+// What a frame does not depend on, or only by its number; and what only its preview does.
+constexpr std::string_view kNotOfFrames[]{"frames", "fps", "only", "shard"};
+constexpr std::string_view kOfPreviews[]{"exposure", "view-transform", "ocio-config", "background"};
 
-// Why `path` is not a whole picture of the `window` of `camera`; "" if it is. Pictures for the screen say
-// nothing of what they are made of.
+// Why `path` is not a whole picture of the `window` of `camera`; "" if it is.
 std::string defect(const std::string& path, const PixelBox& window, const std::string& digest) {
   try {
-    const std::string found = digest.empty() ? "" : outputDigest(path);
+    const std::string found = outputDigest(path);
     const Image image = readImage(path);
     for (const char* name : {"R", "G", "B"})
       if (!image.find(name)) return fmt::format("has no channel {}", name);
@@ -108,6 +107,9 @@ void TurntablePlan::findVolumes(Run& run) {
     if (pattern)
       requireSameGrids(
           range_.frames(), [&](int frame) { return pattern->path(frame); }, run);
+  SceneOptions scene = options_.scene;
+  scene.inputs = inputsOf(first());
+  changesWithTime_ = scene.changesWithTime(options_.picture);
   for (TurntableFrame& frame : frames) {
     frame.inputs = inputsOf(frame.number);
     frame.volumeKey = volumeKeyOf(frame.number, run);
@@ -115,7 +117,8 @@ void TurntablePlan::findVolumes(Run& run) {
 }
 
 bool TurntablePlan::volumeChanges() const {
-  return std::ranges::any_of(inputs_, [](const auto& pattern) { return pattern.has_value(); });
+  return changesWithTime_ ||
+         std::ranges::any_of(inputs_, [](const auto& pattern) { return pattern.has_value(); });
 }
 
 std::vector<std::string> TurntablePlan::inputsOf(int frame) const {
@@ -125,24 +128,27 @@ std::vector<std::string> TurntablePlan::inputsOf(int frame) const {
   return paths;
 }
 
-std::string TurntablePlan::volumeKeyOf(int frame, Run& run) const {
-  if (!volumeChanges()) return "";
+std::string TurntablePlan::filesKeyOf(int frame, Run& run) const {
   ContentHash hash;
   for (const std::string& path : inputsOf(frame)) hash.add(run.files.of(path));
-  // Expressions may know the frame.
-  if (!options_.picture.volumes.color.empty() || isScript(options_.scene.inputs))
-    hash.add(std::to_string(frame));
   return hash.text();
+}
+
+std::string TurntablePlan::volumeKeyOf(int frame, Run& run) const {
+  if (!volumeChanges()) return "";
+  return filesKeyOf(frame, run) + (changesWithTime_ ? fmt::format(" {}", frame) : "");
 }
 
 void TurntablePlan::measure(const PictureOptions& picture, Run& run) const {
   if (!volumeChanges()) return;
   std::optional<Extent> all;
   std::set<std::string> measured;
+  // Other colours are as large.
+  const bool isScripted = isScript(inputsOf(first()));
   run.expect(0, 0.05, int(range_.frames().size()));
   for (const int frame : range_.frames()) {
     run.check();
-    if (!measured.insert(volumeKeyOf(frame, run)).second) continue;
+    if (!measured.insert(isScripted ? volumeKeyOf(frame, run) : filesKeyOf(frame, run)).second) continue;
     SceneOptions scene = options_.scene;
     scene.inputs = inputsOf(frame);
     run.part = Run::Part{.frame = frame};
@@ -154,22 +160,31 @@ void TurntablePlan::measure(const PictureOptions& picture, Run& run) const {
   run.part = Run::Part{.range = all};
 }
 
+std::string TurntablePlan::digestWithout(const std::vector<std::string_view>& options, Run& run) const {
+  return optionsDigest(
+      *options_.app, options,
+      fmt::format("{}-{}{}", first(), last(), volumeChanges() ? run.part->range->text() : ""), run.files);
+}
+
 void TurntablePlan::setDigests(Run& run) {
-  std::vector<std::string_view> others(std::begin(kNotOfPictures), std::end(kNotOfPictures));
+  std::vector<std::string_view> others(std::begin(kNotOfFrames), std::end(kNotOfFrames));
   const bool changes = volumeChanges(), hidesAnew = FramePattern::places(options_.scene.holdout) != 0;
   if (changes) others.push_back("input");
   if (hidesAnew) others.push_back("holdout");
-  const std::string all = optionsDigest(
-      *options_.app, others, fmt::format("{}-{}{}", first(), last(), changes ? run.part->range->text() : ""),
-      run.files);
+  const std::string ofPreviews = digestWithout(others, run);
+  others.insert(others.end(), std::begin(kOfPreviews), std::end(kOfPreviews));
+  const std::string ofFrames = digestWithout(others, run);
   for (TurntableFrame& frame : frames) {
-    frame.digest = all;
-    if (!changes && !hidesAnew) continue;
-    ContentHash hash;
-    hash.add(all);
-    hash.add(frame.volumeKey);
-    if (hidesAnew) hash.add(run.files.of(frame.holdout));
-    frame.digest = hash.text();
+    const auto digestOf = [&](const std::string& all) {
+      if (!changes && !hidesAnew) return all;
+      ContentHash hash;
+      hash.add(all);
+      hash.add(frame.volumeKey);
+      if (hidesAnew) hash.add(run.files.of(frame.holdout));
+      return hash.text();
+    };
+    frame.digest = digestOf(ofFrames);
+    frame.previewDigest = digestOf(ofPreviews);
   }
 }
 
@@ -206,7 +221,7 @@ void skipExisting(TurntablePlan& plan, const Camera& camera, const Run& run) {
           };
           frame.skipped =
               isWhole(frame.path, frame.digest) && (frame.deep.empty() || isWhole(frame.deep, frame.digest));
-          frame.previewSkipped = frame.skipped && isWhole(frame.preview, "");
+          frame.previewSkipped = frame.skipped && isWhole(frame.preview, frame.previewDigest);
         }
       },
       run);

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/options/picture/scene_options.h"
@@ -42,6 +43,8 @@ struct TurntableFrame {
   /// Says what the frame is made of: the options that its pixels depend on, as typed, the contents of the
   /// files that these name, first and last frame, and the version of the program. The attribute kPartDigest.
   std::string digest{};
+  /// The same of its preview, with how that is shown.
+  std::string previewDigest{};
   /// The files are there and whole, and are left as they are.
   bool skipped = false, previewSkipped = false;
   double seconds = 0;
@@ -72,13 +75,17 @@ class TurntablePlan {
   void checkSheets() const;
   void findVolumes(Run& run);
   std::vector<std::string> inputsOf(int frame) const;
+  std::string filesKeyOf(int frame, Run& run) const;
   std::string volumeKeyOf(int frame, Run& run) const;
   bool volumeChanges() const;
+  std::string digestWithout(const std::vector<std::string_view>& options, Run& run) const;
 
   const TurntableOptions& options_;
   FrameRange range_;
   /// Of every input; nothing where it is the same in all frames.
   std::vector<std::optional<FramePattern>> inputs_;
+  /// The volume is another one in every frame, though its file may be the same.
+  bool changesWithTime_ = false;
 };
 
 /// Makes the folders of all outputs, and finds out whether files can be written there.

@@ -48,8 +48,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   PictureOptions picture = options.picture.withView();
   if (!isScript(scene.inputs) && areShapes(scene.inputs))
     // Nothing is bright there, and textures are to look as they do.
-    return writeShapesPicture(scene.inputs, scene.objects, options.picture.withView(ViewCurve::standard),
-                              files, run);
+    return writeShapesPicture(*options.app, scene, options.picture.withView(ViewCurve::standard), files, run);
   // Keys take the contents of all files.
   const PictureStages::Keys keys =
       run.pictureStages ? pictureKeys(*options.app, scene, picture, run) : PictureStages::Keys{};
@@ -65,6 +64,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   picture = picture.resolved(*volume, run, stages->isLit(keys) ? &stages->lit()->light : nullptr);
   scene.addTo(picture, *volume, !options.files.preview.empty(), run);
   const Camera camera = picture.camera();
+  noteColouredHoldout(scene, picture, run);
   if (!scene.holdout.empty())
     picture.render.holdout = readHoldout(scene.holdout, camera, run.memoryLimitBytes);
   run.requireMemory(double(volume->memoryBytes()) + picture.estimateBytes(*volume, camera),

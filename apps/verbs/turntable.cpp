@@ -68,6 +68,7 @@ void makeTurntable(const TurntableOptions& options, Run& run) {
   prepareFolders(options, plan);
   plan.measure(picture, run);
   plan.setDigests(run);
+  noteColouredHoldout(options.scene, picture, run);
   run.expect(0, 0.05, 4);
   LivePicture live(picture.displayServer, options.name(), picture.render);
   TurntableScene scene(options, picture, plan.frames.front(), run);

@@ -39,9 +39,9 @@ void writeExr(const OutputFile& output, const Image& image, const ImageCamera& c
 /// @throws Error naming the path if it cannot be read.
 std::optional<ImageCamera> readImageCamera(const std::string& path);
 
-/// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file; integers as 0 to 1. The pixels
-/// are those of the data window, the display is set where it is another. Nothing is allocated that the file
-/// cannot hold, nor more than `mostBytes`.
+/// Reads all channels of an OpenEXR (flat, first part), PNG or Radiance file as the file has them; integers
+/// as 0 to 1. The pixels are those of the data window, the display is set where it is another. Nothing is
+/// allocated that the file cannot hold, nor more than `mostBytes`.
 /// @throws Error naming the path and what is wrong, also where only pixels are damaged.
 Image readImage(const std::string& path, double mostBytes = std::numeric_limits<double>::infinity());
 
@@ -55,7 +55,8 @@ enum class ColourEncoding {
   srgb
 };
 
-/// As readImage, with R, G, B (three of grey) in linear light; other channels stay as they are.
+/// As readImage, with R, G, B (three of grey) in linear light, premultiplied by the opacity A, which PNG
+/// files do not hold so; other channels stay as they are.
 /// @throws Error also where the file has no colours.
 Image readLinearImage(const std::string& path, ColourEncoding encoding = ColourEncoding::automatic,
                       double mostBytes = std::numeric_limits<double>::infinity());

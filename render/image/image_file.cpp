@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <set>
 #include <system_error>
 
@@ -118,6 +119,8 @@ Image readLinearImage(const std::string& path, ColourEncoding encoding, double m
     if (!channel) throw Error(fmt::format("{}: has no channel {}, nor Y", path, kNames[c]));
     colours[c] = channel->values;
     if (curves) apply((*curves)[c], type, colours[c]);
+    if (const Image::Channel* opacity = header.isPremultiplied ? nullptr : image.find("A"))
+      std::ranges::transform(colours[c], opacity->values, colours[c].begin(), std::multiplies<>());
   }
   for (std::size_t c = 0; c != 3; ++c) {
     if (isGrey) image.add(kNames[c]);

@@ -28,6 +28,8 @@ struct ImageHeader {
   std::vector<Channel> channels;
   /// From the numbers of red, green and blue (or of grey) to light; none where they are light.
   std::optional<std::array<TransferCurve, 3>> curves{};
+  /// Whether the light is multiplied by the opacity already, where there is one.
+  bool isPremultiplied = true;
   /// Name and value, in the order of the file.
   std::vector<std::pair<std::string, std::string>> attributes;
 };

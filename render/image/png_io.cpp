@@ -189,6 +189,7 @@ void detail::readPngFile(const std::string& path, const ImageReader& reader) {
     const int textCount = png_get_text(png.png, png.info, &texts, nullptr);
     for (int i = 0; i < textCount; ++i) header.attributes.emplace_back(texts[i].key, utf8Of(texts[i]));
     header.curves = curvesOf(png.png, png.info);
+    header.isPremultiplied = false;
     reader.begin(header);
 
     const std::size_t rowBytes = png_get_rowbytes(png.png, png.info);

@@ -29,6 +29,9 @@ Texture::Texture(const Image& image) {
   Level first{image.width, image.height, {}};
   first.texels.resize(r.size());
   for (std::size_t i = 0; i < r.size(); ++i) first.texels[i] = {r[i], g[i], b[i]};
+  if (const Image::Channel* opacity = image.find("A"))
+    for (std::size_t i = 0; i < r.size(); ++i)
+      first.texels[i] += Vec3f{1, 1, 1} * std::clamp(1 - opacity->values[i], 0.0f, 1.0f);
   levels_.push_back(std::move(first));
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     const Level& from = levels_.back();

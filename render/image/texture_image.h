@@ -8,7 +8,8 @@
 namespace nephele {
 
 /// A picture that repeats over the plane of texture coordinates, with copies of it, each of half the size,
-/// for what is seen from afar. Row 0 is at v = 1. Linear light in and out.
+/// for what is seen from afar. Row 0 is at v = 1. Linear light in and out; white shows through where the
+/// picture is transparent, so that times the colour of a surface it lies on that.
 class Texture {
  public:
   /// @throws Error if R, G or B is missing or the picture is empty.

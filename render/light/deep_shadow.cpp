@@ -275,6 +275,36 @@ DeepShadowMap DeepShadowMap::read(const std::string& path, double mostBytes) {
   return map;
 }
 
+namespace {
+
+constexpr double kNearly = 1e-4;
+
+void requireSame(const std::string& path, const std::string& light, const char* what, const Vec3d& its,
+                 const Vec3d& ours, double most) {
+  require(
+      length(its - ours) <= most,
+      fmt::format("{}: was made for another light: one that {} ({:.4g}, {:.4g}, {:.4g}); '{}' {} ({:.4g}, "
+                  "{:.4g}, {:.4g})",
+                  path, what, its.x, its.y, its.z, light, what, ours.x, ours.y, ours.z));
+}
+
+}  // namespace
+
+void DeepShadowMap::requireMadeFor(const DistantLight& light, const std::string& path) const {
+  const Mat44& m = camera_.worldToCamera;
+  requireSame(path, light.name, "shines along", normalize(Vec3d{m[2], m[6], m[10]}),
+              -normalize(Vec3d(light.direction)), kNearly);
+}
+
+void DeepShadowMap::requireMadeFor(const LocalLight& light, const std::string& path) const {
+  const Mat44& m = camera_.worldToCamera;
+  Vec3d place;
+  for (std::size_t axis = 0; axis != 3; ++axis)
+    place[int(axis)] = -dot(Vec3d{m[4 * axis], m[4 * axis + 1], m[4 * axis + 2]}, Vec3d{m[12], m[13], m[14]});
+  const Vec3d ours(light.position);
+  requireSame(path, light.name, "stands at", place, ours, kNearly * std::max(length(ours), length(place)));
+}
+
 void DeepShadowMap::write(const std::string& path, const std::map<std::string, std::string>& metadata) const {
   require(image_ != nullptr, path + ": a deep shadow map that was read is not written again");
   writeDeepExr(path, *image_, camera_, metadata);

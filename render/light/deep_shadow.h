@@ -38,6 +38,13 @@ class DeepShadowMap {
   /// @throws Error naming the path; also if the map was itself read.
   void write(const std::string& path, const std::map<std::string, std::string>& metadata = {}) const;
 
+  /// Refuses a map that was read from `path` and made for another light: one whose `worldToCamera` looks
+  /// along another way than a sun shines, or stands elsewhere than a point or spot, by more than a
+  /// ten-thousandth.
+  /// @throws Error naming the path, the light, and both places or ways.
+  void requireMadeFor(const DistantLight& light, const std::string& path) const;
+  void requireMadeFor(const LocalLight& light, const std::string& path) const;
+
   /// What making one holds, at most; it depends on how much a pixel of it meets, here 30 samples as a mean.
   static double estimateBytes(const RenderVolume& volume, const DistantLight& light);
   static double estimateBytes(const RenderVolume& volume, const LocalLight& light);

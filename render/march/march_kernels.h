@@ -52,6 +52,8 @@ struct MarchResult {
   float distance = 0.0f;
   /// Opacity per colour that MarchRay::holdout leaves to be seen, if there is a holdout.
   float heldOpacity[3] = {};
+  /// The opacity that is seen times the colour of the volume, where MarchScene::hasColour.
+  float colouredOpacity[3] = {};
   std::uint32_t samples = 0;
 
   /// What scattered light of a kind adds to.

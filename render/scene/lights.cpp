@@ -24,8 +24,8 @@ void checkColour(const std::string& what, const Vec3f& colour, float most) {
 
 void checkDirection(const std::string& what, const Vec3f& direction) {
   require(isFinite(direction) && length(direction) > 0 && length(direction) <= kFarthest,
-          fmt::format("{}: expected a direction that is finite and not zero, got {}, {}, {}", what,
-                      direction.x, direction.y, direction.z));
+          fmt::format("{}: expected a direction that is not zero and at most {:g} long, got {}, {}, {}", what,
+                      kFarthest, direction.x, direction.y, direction.z));
 }
 
 void checkCone(const std::string& what, const LocalLight::Cone& cone) {
@@ -62,13 +62,13 @@ void Lights::check() const {
   }
   for (const LocalLight& light : locals) {
     require(isFinite(light.position) && length(light.position) <= kFarthest,
-            fmt::format("{}: expected a position that is finite, got {}, {}, {}", light.name,
-                        light.position.x, light.position.y, light.position.z));
+            fmt::format("{}: expected a position at most {:g} from the origin, got {}, {}, {}", light.name,
+                        kFarthest, light.position.x, light.position.y, light.position.z));
     checkColour(light.name, light.intensity, kBrightest);
     checkColour(light.name + ": shadow multiplier", light.shadow, 100);
     require(light.decayStart >= 0 && light.decayStart <= kFarthest,
-            fmt::format("{}: expected a decay that starts at a distance of at least 0, got {}", light.name,
-                        light.decayStart));
+            fmt::format("{}: expected a decay that starts at a distance within [0, {:g}], got {}", light.name,
+                        kFarthest, light.decayStart));
     if (light.cone) checkCone(light.name, *light.cone);
   }
   require(shadowDetail == 1 || shadowDetail == 2 || shadowDetail == 4,

@@ -49,25 +49,26 @@ double fraction(double x) {
   return x - std::floor(x);
 }
 
-// The texture at (u, v), which repeats.
+// The texture at (u, v), which repeats. Where it is transparent, white shows through: times the colour of the
+// object it lies on that.
 Vec3f texel(const Image& image, double u, double v) {
   const double x = fraction(u) * image.width - 0.5, y = fraction(1 - v) * image.height - 0.5;
   const double x0 = std::floor(x), y0 = std::floor(y);
   const auto wrapped = [](double place, int count) { return (int(place) % count + count) % count; };
   const int columns[] = {wrapped(x0, image.width), wrapped(x0 + 1, image.width)},
             rows[] = {wrapped(y0, image.height), wrapped(y0 + 1, image.height)};
-  Vec3f result;
-  static constexpr const char* kNames[] = {"R", "G", "B"};
-  for (int c = 0; c != 3; ++c) {
-    const std::vector<float>& values = image.channel(kNames[c]).values;
+  const auto valueOf = [&](const Image::Channel& channel) {
     const auto at = [&](int row, int column) {
-      return double(values[std::size_t(rows[row]) * image.width + columns[column]]);
+      return double(channel.values[std::size_t(rows[row]) * image.width + columns[column]]);
     };
     const double top = at(0, 0) + (at(0, 1) - at(0, 0)) * (x - x0),
                  bottom = at(1, 0) + (at(1, 1) - at(1, 0)) * (x - x0);
-    result[c] = float(top + (bottom - top) * (y - y0));
-  }
-  return result;
+    return float(top + (bottom - top) * (y - y0));
+  };
+  const Image::Channel* opacity = image.find("A");
+  const float beside = opacity ? std::clamp(1 - valueOf(*opacity), 0.0f, 1.0f) : 0.0f;
+  return Vec3f{valueOf(image.channel("R")), valueOf(image.channel("G")), valueOf(image.channel("B"))} +
+         Vec3f{1, 1, 1} * beside;
 }
 
 std::size_t meshBytes(const Mesh& mesh) {

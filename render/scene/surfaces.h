@@ -23,7 +23,7 @@ struct SurfaceObject {
   /// divided by four; 0: none.
   int checkers = 0;
   /// Colour in the unit square of texture coordinates, which repeats; linear, channels R, G, B, row 0 at v =
-  /// 1. Interpolated linearly.
+  /// 1. Interpolated linearly. Where it has an A below 1, `colour` shows through.
   std::shared_ptr<const Image> texture{};
   /// Hides what is behind it, and is not in the picture itself: black, with no opacity.
   bool isHoldout = false;

@@ -48,6 +48,7 @@ struct MarchScene {
   ColourBricks colour, emission;
   /// Whether steps that are known have colours of their own, in place of `colour`.
   bool hasStepColours = false;
+  bool hasColour() const { return colour.table || hasStepColours; }
   /// The same of what glows, in place of `emission`.
   bool hasStepGlow = false;
   float emissionScale = 1.0f;
@@ -67,9 +68,7 @@ struct MarchScene {
     return sum / 3.0f;
   }
   /// Where it holds, every colour is marched with opacities of its own; `colours` must be 3.
-  bool isColoured() const {
-    return colour.table || hasStepColours || glows() || hasExtinctionColour() || hasColouredShadow;
-  }
+  bool isColoured() const { return hasColour() || glows() || hasExtinctionColour() || hasColouredShadow; }
   bool glows() const { return emission.table || hasStepGlow; }
 
   /// `shadow` multiplies the extinction between light and sample, per colour; for `bend` see LightVolume.

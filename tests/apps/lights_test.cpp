@@ -182,6 +182,9 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
       {"--sky " + file("broken.hdr"), "broken.hdr: is damaged: 0 bytes cannot hold 4 x 2 pixels", 1},
       {"--read-deep-shadow " + file("map.exr"), "map.exr: is not a deep image", 1},
       {"--point 0.1,0,0,1 --shadows deep", "choose shadows from a volume", 1},
+      {"--point 2e9,0,0,4", "point: expected a position at most 1e+09 from the origin", 1},
+      {"--sun key=60,30,3 --light-decay key=linear", "--light-decay: 'key' is a sun", 1},
+      {"--sky clear --sky-rotation 30", "--sky-rotation: turns a map", 2},
   };
   for (const auto& c : cases) {
     const ProgramResult result = render(c.options, "bad.exr");
@@ -189,6 +192,22 @@ TEST_F(LightOptions, RefusesWhatIsWrongByItsOption) {
     EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.options << ": " << result.errors;
     EXPECT_FALSE(std::filesystem::exists(data_->file("bad.exr")));
   }
+}
+
+TEST_F(LightOptions, ADeepShadowIsThatOfItsLightOnly) {
+  const ProgramResult made = render("--sun 60,30 --write-deep-shadow " + file("sun.exr"));
+  ASSERT_EQ(made.exitCode, 0) << made.errors;
+  EXPECT_EQ(render("--sun 60,30 --read-deep-shadow " + file("sun.exr")).exitCode, 0);
+  const ProgramResult other = render("--sun 61,30 --read-deep-shadow " + file("sun.exr"));
+  EXPECT_EQ(other.exitCode, 1);
+  EXPECT_NE(other.errors.find("sun.exr: was made for another light"), std::string::npos) << other.errors;
+  EXPECT_EQ(render("--point 0,0,9,50 --read-deep-shadow " + file("sun.exr")).exitCode, 1);
+}
+
+TEST_F(LightOptions, IntensityMultipliesAnEvenSky) {
+  const Image once = picture("--sun none --sky 0.5,0.5,0.5"),
+              twice = picture("--sun none --sky 0.5,0.5,0.5 --sky-intensity 2");
+  EXPECT_NEAR(twice.at("G", 8, 6), 2 * once.at("G", 8, 6), 2e-3f * twice.at("G", 8, 6));
 }
 
 // A grey of 128 of 255 is 0.216 of the light on the curve of sRGB and 0.502 of it as it stands: times 2.325.

@@ -116,6 +116,10 @@ TEST_F(RenderLayers, AHoldoutInTheMiddleLeavesTheFrontHalf) {
   ASSERT_EQ(
       runProgram(start() + folder.file("a.exr") + options + "--holdout " + folder.file("wall.exr")).exitCode,
       0);
+  const ProgramResult coloured =
+      runProgram("render " + fog() + " --size 32x24 -o " + folder.file("c.exr") + options + "--holdout " +
+                 folder.file("wall.exr") + " --extinction-color 1,1,0.5");
+  EXPECT_NE(coloured.errors.find("one opacity for all colours"), std::string::npos) << coloured.errors;
   // exp(-ln 2) of the light gets through a radius of the ball; an element behind the wall would find alpha 0.
   EXPECT_NEAR(readImage(folder.file("a.exr")).at("A", 16, 12), 0.5f, 0.01f);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <functional>
 
 #include "nephele/levelset/grid/openvdb_instances.h"
@@ -119,6 +120,72 @@ TEST(RenderBadInput, IsRefusedByNameAndReason) {
     EXPECT_NE(result.errors.find(c.says), std::string::npos) << c.says << ": " << result.errors;
     EXPECT_EQ(folder.entryCount(), 0u);
   }
+}
+
+TEST(RenderBadInput, NumbersThatGlowAreToBeFinite) {
+  const TemporaryFolder folder;
+  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid&) {});
+  openvdb::io::File file(path);
+  file.open();
+  const auto grids = file.getGrids();
+  file.close();
+  auto heat = openvdb::FloatGrid::create(0);
+  heat->setName("heat");
+  heat->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+  heat->tree().setValue({0, 0, 0}, INFINITY);
+  grids->push_back(heat);
+  file.write(*grids);
+  file.close();
+  const ProgramResult result =
+      runProgram("render " + path + " --emission-grid heat --size 8x6 -o " + folder.file("a.exr"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_NE(result.errors.find("holds values that are not finite"), std::string::npos) << result.errors;
+}
+
+TEST(RenderColor, FindsTheFrameAndTheSeed) {
+  const TemporaryFolder folder;
+  const std::string path = writeBall(folder, 0, [](openvdb::FloatGrid&) {});
+  std::ofstream(folder.file("a.chan")) << "1 0 0 9 0 0 0 20\n3 0 0 9 0 0 0 20\n";
+  std::ofstream(folder.file("a.felt")) << "scalarfield density = mask(sphere((0, 0, 0), 0.5), 0.1);\n"
+                                          "vectorfield color = (time / 4, seed / 8.0, 1);\n";
+  const std::string common = " --size 8x6 --samples 1 --extinction 40 --aov albedo --seed 4 --camera " +
+                             folder.file("a.chan") + " --frame 1 -o " + folder.file("a.exr");
+  for (const std::string& input : {path + " --color '=(time / 4, seed / 8.0, 1)'", folder.file("a.felt"),
+                                   folder.file("a.felt --detail exact")}) {
+    const ProgramResult result = runProgram("render " + input + common);
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+    const Image image = readImage(folder.file("a.exr"));
+    const float whole = 0.99f * image.at("A", 4, 3);
+    EXPECT_GT(whole, 0.5f);
+    EXPECT_NEAR(image.at("albedo.R", 4, 3), 0.25f * whole, 1e-2f);
+    EXPECT_NEAR(image.at("albedo.G", 4, 3), 0.5f * whole, 1e-2f);
+    EXPECT_NEAR(image.at("albedo.B", 4, 3), whole, 1e-2f);
+  }
+  // A script declares all of this itself.
+  for (const std::string option : {"--color '=(1, 1, 1)'", "--color-grid Cd", "--grid density"}) {
+    const ProgramResult result = runProgram("render " + folder.file("a.felt") + " " + option + common);
+    EXPECT_EQ(result.exitCode, 2) << option;
+    EXPECT_NE(result.errors.find(option.substr(0, option.find(' ')) + ": is for files of volumes"),
+              std::string::npos)
+        << result.errors;
+  }
+}
+
+TEST(RenderShapes, RefusesWhatShowsBesideAVolumeOnly) {
+  const TemporaryFolder folder;
+  const std::string mesh = ownData("data/sphere_uv.obj"),
+                    start = "render " + mesh + " --size 8x6 --preview " + folder.file("a.png") + " ";
+  const std::string file = folder.file("b.exr");
+  for (const std::string& option :
+       {"--holdout " + file, "--holdout-object " + mesh, "--object " + mesh, std::string("--aov Z"),
+        "--write-deep-shadow " + file, std::string("--volume-motion 1,0,0 --shutter -0.25,0.25"),
+        "--deep " + file}) {
+    const ProgramResult result = runProgram(start + option);
+    EXPECT_EQ(result.exitCode, 2) << option;
+    EXPECT_NE(result.errors.find(option.substr(0, option.find(' ')) + ": needs a volume"), std::string::npos)
+        << result.errors;
+  }
+  EXPECT_EQ(runProgram(start + "--aov none").exitCode, 0);
 }
 
 TEST(RenderBadInput, IsNamedBesideOtherVolumes) {

@@ -66,6 +66,39 @@ TEST_F(TurntableVerb, SkipsWithoutMakingLightAndAddsMissingPreviews) {
   EXPECT_EQ(statistics()["rays"], 0);
 }
 
+TEST_F(TurntableVerb, ShowsFramesThatWereThereAsOneCallDoes) {
+  const auto sheet = [&](const std::string& name, const std::string& options) {
+    const ProgramResult result = runProgram(call("--frames 1-2 --stats '" + folder.file("s.json") +
+                                                 "' --contact-sheet '" + folder.file(name) + "' " + options));
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file(name)).channel("B").values;
+  };
+  const auto one = sheet("one.png", ""), black = sheet("black.png", "--background 0,0,0");
+  // Frames without a backdrop, then with one.
+  for (const std::string& made : {std::string(), " --contact-sheet '" + folder.file("c.png") + "'"}) {
+    ASSERT_EQ(runProgram(call("--frames 1-2" + made)).exitCode, 0);
+    EXPECT_EQ(sheet("more.png", "--skip-existing"), one);
+    EXPECT_EQ(statistics()["frames"][0]["skipped"], true);
+    EXPECT_EQ(sheet("more.png", "--skip-existing --background 0,0,0"), black);
+  }
+}
+
+TEST_F(TurntableVerb, MakesPreviewsAgainThatAreShownInAnotherWay) {
+  const std::string path = folder.file("v.1.png"),
+                    start = "--frames 1 --skip-existing --preview '" + folder.file("v.#.png") + "' ";
+  const auto preview = [&](const std::string& options) {
+    const ProgramResult result = runProgram(call(start + options));
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(path).channel("G").values;
+  };
+  const auto first = preview("");
+  const auto before = fs::last_write_time(path);
+  EXPECT_EQ(preview(""), first);
+  EXPECT_EQ(fs::last_write_time(path), before);
+  for (const char* options : {"--exposure 1", "--view-transform agx", "--background 1,0,0"})
+    EXPECT_NE(preview(options), first) << options;
+}
+
 TEST_F(TurntableVerb, SkipsOnlyWhatWasMadeWithTheSameOptionsOfTheSameInput) {
   const std::string input = folder.file("in.vdb");
   fs::copy_file(data_->file("club.vdb"), input);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "nephele/render/image/deep_image.h"
 #include "nephele/render/image/exr_io.h"
@@ -90,6 +91,23 @@ TEST_F(TurntableVerb, RefusesDepthThatDoesNotFit) {
   fails("--deep '" + folder.file("e.####.exr") + "' --adaptive 0.1", 2, "--adaptive");
   // One file for all frames is that of one camera.
   fails("--holdout '" + folder.file("d.0001.exr") + "'", 1, "d.0001.exr");
+}
+
+TEST_F(TurntableVerb, TellsScriptsAndColoursTheFrame) {
+  const std::string script = folder.file("a.felt");
+  std::ofstream(script) << "scalarfield density = mask(sphere((0, 0, 0), 1), 0.1);\n"
+                           "vectorfield color = (time / 4, 1, 1);\n";
+  const std::string options = " -o '" + folder.file("f.####.exr") +
+                              "' --frames 1-2 --size 16x12 --samples 1 --aov albedo --extinction 40";
+  for (const std::string& input : {script, volume("ball.vdb") + " --color '=(time / 4, 1, 1)'"}) {
+    const ProgramResult result = runProgram("turntable " + input + options);
+    ASSERT_EQ(result.exitCode, 0) << result.errors;
+    for (int number = 1; number <= 2; ++number) {
+      const Image image = readImage(frame(number));
+      EXPECT_NEAR(image.at("albedo.R", 8, 6), 0.25f * float(number) * image.at("albedo.G", 8, 6), 0.01f)
+          << input << number;
+    }
+  }
 }
 
 // Long in x: nearer, and so finer, where the camera looks along it. Frames are those of render with the same

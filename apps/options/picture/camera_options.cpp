@@ -253,6 +253,10 @@ CameraOptions CameraOptions::placed(const Extent& own, const Run& run) const {
   return result;
 }
 
+double CameraOptions::time(const Run& run) const {
+  return run.frame() ? double(*run.frame()) : frameNumber.value_or(0);
+}
+
 std::vector<Vec3f> CameraOptions::outermost(const std::vector<Vec3f>& points) const {
   if (file.empty() && !position)
     return Camera::outermost(points, view.x, view.y, Placement(*this).frameOf({}));

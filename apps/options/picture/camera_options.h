@@ -48,6 +48,8 @@ struct CameraOptions {
   /// The camera that these options place around what is seen. @throws CLI::Error for options that do not fit
   /// together, Error for a bad file.
   Camera camera() const { return camera(0); }
+  /// The frame of the picture, as expressions and scripts find it: that of the run, of `file`, or 0.
+  double time(const Run& run) const;
   /// The camera of `file` so many frames later; nothing without a file.
   std::optional<Camera> laterCamera(double frames) const;
   /// The motion of the volume, about the middle of what is seen; nothing for an instant.

@@ -266,7 +266,7 @@ void addSky(CLI::App& app, LightOptions& options) {
       ->default_str("0");
   addNumber(
       app, "--sky-intensity", 0, 1e6, [&options](double x) { options.sky.intensity = float(x); },
-      "Multiplies the radiance of the map, or of the clear sky.")
+      "Multiplies the radiance of the sky.")
       ->default_str("1");
   addColourEncoding(app, "--sky-encoding", options.sky.encoding,
                     "How the numbers of the map stand for light; auto: as the file says.");
@@ -346,8 +346,7 @@ void LightOptions::setClearSky(const std::vector<std::size_t>& ofTheSky, Lights&
     DistantLight& sun = result.suns[i];
     sun.irradiance = i == 0 ? result.clear->sunlight() : skyOf(sun.direction).sunlight();
   }
-  result.map = std::make_shared<const Environment>(
-      result.clear->map(kRows, sky.intensity).turned(double(sky.rotationDegrees)));
+  result.map = std::make_shared<const Environment>(result.clear->map(kRows, sky.intensity));
   result.sky = {};
 }
 
@@ -370,6 +369,9 @@ Lights LightOptions::resolved(double longestSide, double mostBytes) const {
         light.decayStart = float(said.start.worldUnits(longestSide));
         known = true;
       }
+    for (const DistantLight& sun : result.suns)
+      if (!known && sun.name == name)
+        throw Error(fmt::format("--light-decay: '{}' is a sun, and suns have no decay", name));
     requireLight("--light-decay", name, known, result);
   }
   for (const auto& [name, said] : shadows)
@@ -377,8 +379,15 @@ Lights LightOptions::resolved(double longestSide, double mostBytes) const {
   if (deepShadows) result.deepTolerance = deepTolerance;
   for (const auto& [name, file] : readShadows) {
     const auto map = std::make_shared<const DeepShadowMap>(DeepShadowMap::read(file));
-    forLights("--read-deep-shadow", name, result, [&](auto& light) { light.deepShadow = map; });
+    forLights("--read-deep-shadow", name, result, [&, path = file](auto& light) {
+      map->requireMadeFor(light, path);
+      light.deepShadow = map;
+    });
   }
+  if (turbidity && sky.rotationDegrees != 0)
+    throw CLI::ValidationError(
+        "--sky-rotation", "turns a map (--sky FILE); a clear sky belongs to its sun, and turns with --sun");
+  result.sky *= sky.intensity;
   if (turbidity) setClearSky(ofTheSky, result);
   if (!skyFile.empty()) {
     result.map = std::make_shared<const Environment>(Environment::read(skyFile, sky, mostBytes));

@@ -61,9 +61,9 @@ std::span<const std::string_view> mediumOptions() {
 PictureStages::Keys pictureKeys(const CLI::App& app, const SceneOptions& scene, const PictureOptions& picture,
                                 Run& run) {
   if (picture.pathTraced || isScript(scene.inputs) || !picture.light.writtenShadows.empty()) return {};
-  // Expressions may know the frame. Layers and surfaces decide what of the volume is kept.
+  // Expressions may know the frame and the seed. Layers and surfaces decide what of the volume is kept.
   ContentHash more;
-  if (!picture.volumes.color.empty()) more.add(std::to_string(run.frame().value_or(0)));
+  if (!picture.volumes.color.empty()) more.add(fmt::format("{} {}", picture.time(run), picture.seed));
   more.add(fmt::format("{} {} {}", picture.readsCodes(), picture.needsSamples(), scene.objects.any()));
   if (run.part && run.part->range) more.add(run.part->range->text());
   const std::string text = more.text();

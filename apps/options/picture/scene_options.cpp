@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/options/expression_names.h"
 #include "apps/options/picture/shapes_picture.h"
 
 namespace nephele::apps {
@@ -20,8 +21,10 @@ void SceneVolume::resample(float voxelSize, const Progress& progress) {
 SceneVolume SceneOptions::sceneVolume(PictureOptions& picture, Run& run) const {
   const auto made = [&]() -> SceneVolume {
     if (!isScript(inputs))
-      return SceneVolume(
-          readVolumes(inputs, picture.volumes, {picture.shutter, picture.readsCodes(), objects.any()}, run));
+      return SceneVolume(readVolumes(
+          inputs, picture.volumes,
+          {picture.shutter, picture.readsCodes(), objects.any(), picture.time(run), picture.seed}, run));
+    requireNoGrids(picture.volumes);
     ScriptVolume ran(inputs.front(), script, picture, run);
     RenderVolume sampled = ran.forCameraOf(picture, run);
     return {std::move(sampled), std::move(ran)};
@@ -33,6 +36,20 @@ SceneVolume SceneOptions::sceneVolume(PictureOptions& picture, Run& run) const {
 
 RenderVolume SceneOptions::volume(PictureOptions& picture, Run& run) const {
   return sceneVolume(picture, run).taken();
+}
+
+bool SceneOptions::changesWithTime(const PictureOptions& picture) const {
+  const std::string& color = picture.volumes.color;
+  ExpressionNames names = namesOfPlace(0, 0);
+  // Who does without the name does not read it.
+  std::erase_if(names.given, [](const felt::Given& one) { return one.name == "time"; });
+  try {
+    if (isScript(inputs)) felt::Program::fromFile(inputs.front(), *names.registry, names.given);
+    if (!color.empty()) checkedExpression("--color", color, {felt::Kind::vectorField}, names);
+    return false;
+  } catch (const felt::ScriptError&) {
+    return true;
+  }
 }
 
 Extent SceneOptions::measured(const PictureOptions& picture, Run& run) const {
@@ -61,6 +78,14 @@ void SceneOptions::addTo(PictureOptions& picture, const RenderVolume& volume, bo
   if (picture.adaptiveThreshold > 0)
     refuseValue("--adaptive", fmt::format("{:g}", picture.adaptiveThreshold), "0 with --deep");
   picture.render.adaptiveThreshold = 0;
+}
+
+void noteColouredHoldout(const SceneOptions& scene, const PictureOptions& picture, const Run& run) {
+  const Vec3f& share = picture.medium.extinctionColour;
+  if (!scene.holdout.empty() && (share.x != share.y || share.y != share.z))
+    run.note(
+        "--holdout: a deep picture has one opacity for all colours, so that with --extinction-color the "
+        "elements add up in the mean of the colours only");
 }
 
 void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs) {

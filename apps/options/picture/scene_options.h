@@ -46,6 +46,8 @@ struct SceneOptions {
   SceneVolume sceneVolume(PictureOptions& picture, Run& run) const;
   /// For one camera, that of `picture`.
   RenderVolume volume(PictureOptions& picture, Run& run) const;
+  /// Whether the volume is another one at another time, though its file is the same.
+  bool changesWithTime(const PictureOptions& picture) const;
   /// How large the inputs are: volumes, or shapes alone. @throws Error naming the file.
   Extent measured(const PictureOptions& picture, Run& run) const;
   /// The same for sequences, with what of the outline the camera of `picture` frames.
@@ -55,6 +57,9 @@ struct SceneOptions {
   /// options that do not fit together, Error naming the file of an object.
   void addTo(PictureOptions& picture, const RenderVolume& volume, bool isShown, const Run& run) const;
 };
+
+/// Says so where a holdout meets an extinction that differs between colours.
+void noteColouredHoldout(const SceneOptions& scene, const PictureOptions& picture, const Run& run);
 
 /// Declares the inputs on `app`, described by `inputs`.
 void addSceneInputs(CLI::App& app, SceneOptions& options, const std::string& inputs);

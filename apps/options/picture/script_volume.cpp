@@ -61,8 +61,7 @@ class Declared {
 ScriptScene runScript(const std::string& path, const ScriptOptions& options, const PictureOptions& picture,
                       Run& run) {
   run.begin("script");
-  const double frame = run.frame() ? double(*run.frame()) : picture.frameNumber.value_or(0);
-  const ExpressionNames names = namesOfPlace(frame, picture.seed);
+  const ExpressionNames names = namesOfPlace(picture.time(run), picture.seed);
   const felt::Program program = felt::Program::fromFile(path, feltFunctions(), names.given);
   for (const felt::Diagnostic& warning : program.warnings())
     run.note(felt::formatted(warning, program.sources()));

@@ -25,6 +25,16 @@ Extent extentOf(const std::vector<SurfaceObject>& shapes) {
   return result;
 }
 
+void requireNothingOfVolumes(const CLI::App& app, const PictureOptions& options) {
+  const auto refuse = [](const char* option) {
+    throw CLI::ValidationError(option, "needs a volume; meshes and level sets alone are shown without it");
+  };
+  for (const char* option :
+       {"--deep", "--holdout", "--object", "--holdout-object", "--write-deep-shadow", "--volume-motion"})
+    if (app.count(option) > 0) refuse(option);
+  if (app.count("--aov") > 0 && options.render.aovs != std::vector<std::string>{"none"}) refuse("--aov");
+}
+
 }  // namespace
 
 Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run) {
@@ -40,12 +50,11 @@ bool areShapes(const std::vector<std::string>& paths) {
   });
 }
 
-void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
-                        const PictureOptions& options, const PictureFiles& files, Run& run) {
-  if (!files.deep.empty())
-    throw CLI::ValidationError("--deep", "shows a volume; meshes and level sets alone have no deep picture");
+void writeShapesPicture(const CLI::App& app, const SceneOptions& scene, const PictureOptions& options,
+                        const PictureFiles& files, Run& run) {
+  requireNothingOfVolumes(app, options);
   run.begin("read");
-  std::vector<SurfaceObject> shapes = objects.shapes(inputs, run.memoryLimitBytes);
+  std::vector<SurfaceObject> shapes = scene.objects.shapes(scene.inputs, run.memoryLimitBytes);
   SurfacePictureOptions shown;
   shown.camera = options.placed(extentOf(shapes), run).camera();
   if (shown.camera->hasLens() || shown.camera->isMoving())
@@ -57,7 +66,7 @@ void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOpti
   run.begin("write");
   files.write(picture, *shown.camera, options.screen, run.metadata());
   run.result(fmt::format("{}: {}x{}, {} surface{}", files.name(), shown.camera->width(),
-                         shown.camera->height(), inputs.size(), inputs.size() == 1 ? "" : "s"));
+                         shown.camera->height(), scene.inputs.size(), scene.inputs.size() == 1 ? "" : "s"));
 }
 
 }  // namespace nephele::apps

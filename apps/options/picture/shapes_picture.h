@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/options/picture/object_options.h"
 #include "apps/options/picture/picture_files.h"
+#include "apps/options/picture/scene_options.h"
 
 namespace nephele::apps {
 
@@ -16,9 +16,10 @@ bool areShapes(const std::vector<std::string>& paths);
 Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run);
 
 /// Writes a picture of meshes and level sets alone, shaded quickly in a light of their own. The camera, the
-/// view transform and the paint of objects are those of the options.
-/// @throws CLI::Error for a camera that cannot be or a deep picture, Error naming the file.
-void writeShapesPicture(const std::vector<std::string>& inputs, const ObjectOptions& objects,
-                        const PictureOptions& options, const PictureFiles& files, Run& run);
+/// view transform and the paint of objects are those of the options, which `app` has read.
+/// @throws CLI::Error for a camera that cannot be, and what shows beside a volume only: depth, layers,
+/// objects, holdouts; Error naming the file.
+void writeShapesPicture(const CLI::App& app, const SceneOptions& scene, const PictureOptions& options,
+                        const PictureFiles& files, Run& run);
 
 }  // namespace nephele::apps

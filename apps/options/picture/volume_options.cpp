@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -48,13 +49,11 @@ VolumePart::Grids readThree(const std::string& path, const std::string& grid, do
 
 // A grid of colours, or of numbers that glow white.
 VolumePart::Grids readGlow(const std::string& path, const std::string& grid, Run& run) {
-  std::shared_ptr<const BrickGrid> one;
-  try {
-    one = readFog(path, grid, run);
-  } catch (const Error&) {
-    // If it is no grid of colours either, that is what is said.
-    return readThree(path, grid);
-  }
+  const bool isNumbers = std::ranges::any_of(readVdbHeaders(path), [&](const VdbGrid& one) {
+    return labelOf(one).name == grid && valuesOf(one) == VdbValues::scalar;
+  });
+  if (!isNumbers) return readThree(path, grid);
+  const std::shared_ptr<const BrickGrid> one = readFog(path, grid, run);
   return {one, one, one};
 }
 
@@ -65,13 +64,14 @@ T entryOf(const std::vector<T>& list, std::size_t index, const T& standard) {
 }
 
 // Colours of an expression, where the density has samples, and a little beyond, so that no edge is darker.
-VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& density, Run& run) {
+VolumePart::Grids colourOf(const std::string& expression, const BrickGrid& density,
+                           const VolumeReading& reading, Run& run) {
   // Colours change over shapes, not within their detail.
   constexpr float kAcross = 192;
   const Box box = density.worldBox();
   const float side = box.longestSide(), voxel = std::max(side / kAcross, density.voxelSize());
   const VectorField color = evaluated("--color", expression, {felt::Kind::vectorField},
-                                      namesOfPlace(double(run.frame().value_or(0)), 0), run.longestSide(box))
+                                      namesOfPlace(reading.time, reading.seed), run.longestSide(box))
                                 .as<VectorField>();
   VolumePart::Grids grids;
   for (std::size_t c = 0; c < 3; ++c)
@@ -107,7 +107,7 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   if (const std::string name = nameIn(options.colourGrids); !name.empty())
     part.colour = readThree(path, name);
   else if (!options.color.empty())
-    part.colour = colourOf(options.color, *part.density, run);
+    part.colour = colourOf(options.color, *part.density, reading, run);
   if (const std::string name = nameIn(options.emissionGrids); !name.empty())
     part.emission = readGlow(path, name, run);
   if (const std::string name = nameIn(options.temperatureGrids); !name.empty())
@@ -180,6 +180,22 @@ void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
       ->default_str("1");
 }
 
+void requireNoGrids(const VolumeOptions& options) {
+  const auto names = [](const std::vector<std::string>& list) {
+    return std::ranges::any_of(list, [](const std::string& name) { return name != "none"; });
+  };
+  // Not --temperature-grid, which a look gives to whatever it is put on.
+  const std::pair<const char*, bool> given[] = {{"--grid", names(options.densityGrids)},
+                                                {"--color-grid", names(options.colourGrids)},
+                                                {"--color", !options.color.empty()},
+                                                {"--emission-grid", names(options.emissionGrids)},
+                                                {"--velocity-grid", names(options.velocityGrids)}};
+  for (const auto& [option, isGiven] : given)
+    if (isGiven)
+      throw CLI::ValidationError(option, "is for files of volumes; a script declares what there is itself");
+  checkCount("--density-scale", options.densityScales.size(), 1);
+}
+
 RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOptions& options,
                          const VolumeReading& reading, Run& run) {
   checkCount("--grid", options.densityGrids.size(), paths.size());
@@ -223,7 +239,7 @@ RenderVolume volumeOf(const std::function<std::shared_ptr<const BrickGrid>(const
   if (isAsked("--color-grid", options.colourGrids))
     part.colour = {density, density, density};
   else if (!options.color.empty())
-    part.colour = colourOf(options.color, *density, run);
+    part.colour = colourOf(options.color, *density, reading, run);
   if (isAsked("--emission-grid", options.emissionGrids)) part.emission = {density, density, density};
   if (isAsked("--temperature-grid", options.temperatureGrids)) part.temperature = density;
   if (!options.velocityGrids.empty())

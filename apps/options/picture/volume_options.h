@@ -33,6 +33,10 @@ struct VolumeOptions {
 /// Declares the options on `app`.
 void addVolumeOptions(CLI::App& app, VolumeOptions& options);
 
+/// Refuses options that choose grids or colours, where a script declares all of a volume.
+/// @throws CLI::ValidationError naming the option.
+void requireNoGrids(const VolumeOptions& options);
+
 /// How volumes are read.
 struct VolumeReading {
   /// Motion blurs them while it is open.
@@ -41,6 +45,9 @@ struct VolumeReading {
   bool coded = false;
   /// Other things stand in the volumes: these keep their place, too thin to be seen, where their scale is 0.
   bool holdsObjects = false;
+  /// What an expression finds.
+  double time = 0;
+  int seed = 0;
 };
 
 /// Reads the volumes of `paths` as they are marched, all as one.

@@ -105,9 +105,9 @@ class Marcher {
   // The part of it that the lattices hold.
   void scattered(const LitPart<kColours>& steps, const Cells& cells);
 
-  // Of the light so far, a vector each: three colours of every sun, then the scattered lattices.
-  static constexpr std::size_t kMostSums = 3 * MarchScene::kMostSuns + 2 * MarchScene::kMostScattered;
-  std::size_t sumCount() const { return 3 * scene_.suns.size() + 2 * scene_.scattered.size(); }
+  // So far, a vector each: three colours of every sun, the scattered lattices, MarchResult::colouredOpacity.
+  static constexpr std::size_t kMostSums = 3 * MarchScene::kMostSuns + 2 * MarchScene::kMostScattered + 3;
+  std::size_t sumCount() const { return 3 * scene_.suns.size() + 2 * scene_.scattered.size() + 3; }
 
   void addSums(MarchResult& result) const;
 

@@ -83,6 +83,8 @@ inline void Marcher<kColours>::addSums(MarchResult& result) const {
       result.of(lattice.kinds[n]) += hn::GetLane(hn::SumOfLanes(d, sum[n]));
     sum += 2;
   }
+  if constexpr (kColours == 3)
+    for (int c = 0; c != 3; ++c) result.colouredOpacity[c] += hn::GetLane(hn::SumOfLanes(d, sum[c]));
 }
 
 }  // namespace nephele::HWY_NAMESPACE

@@ -66,9 +66,12 @@ inline bool Marcher<kColours>::flush() {
     LitPart<kColours> steps{hn::Load(d, s_ + i), hn::Load(d, ds_ + i), {}};
     weigh(i, hn::Load(d, own + i), hn::Load(d, after + i),
           isHeld_ ? hn::Load(d, seen_ + i) : hn::Set(d, 1.0f), steps);
-    if constexpr (kColours == 3)
+    if constexpr (kColours == 3) {
       for (int c = 0; c != 3 && scene_.hasStepColours; ++c)
         steps.weight[c] = hn::Mul(steps.weight[c], hn::Load(d, colours_[c] + i));
+      Floats* coloured = sums_ + sumCount() - 3;
+      for (int c = 0; c != 3 && scene_.hasColour(); ++c) coloured[c] = hn::Add(coloured[c], steps.weight[c]);
+    }
     if (lit_.empty() && hn::AllTrue(d, hn::Gt(steps.weightOfAll(), hn::Zero(d)))) {
       light(steps);
     } else {

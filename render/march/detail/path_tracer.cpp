@@ -186,14 +186,16 @@ bool PathTracer::arrive(std::uint32_t index, Flight& flight, const std::optional
   }
   if (seesSkyOnly || (path.scatterings > 0 && path.scatterings == options_.maxScatterings)) return false;
   if (isMet) {
-    if (path.scatterings == 0 && !meetFirst(path, flight.arriving, flight.distance, nullptr)) return false;
-    path.isInWorld = false;
     const Vec3d place = flight.ray.origin + flight.ray.direction * flight.distance;
-    path.weight = path.weight * volume_.albedoAt(place);
+    const Vec3f albedo = volume_.albedoAt(place);
+    if (path.scatterings == 0 && !meetFirst(path, flight.arriving, flight.distance, albedo, false))
+      return false;
+    path.isInWorld = false;
+    path.weight = path.weight * albedo;
     return scatter(index, {place, Vec3f(flight.ray.direction), {}, {}, false}, wave);
   }
   if (path.scatterings == 0 &&
-      (hit->isHoldout || !meetFirst(path, flight.arriving, hit->distance, &hit->colour)))
+      (hit->isHoldout || !meetFirst(path, flight.arriving, hit->distance, hit->colour, true)))
     return false;
   path.weight = path.weight * hit->colour;
   ++path.reflections;
@@ -202,16 +204,15 @@ bool PathTracer::arrive(std::uint32_t index, Flight& flight, const std::optional
   return scatter(index, {place, Vec3f(path.ray.direction), hit->normal, hit->faceNormal, true}, wave);
 }
 
-// Notes what the camera sees first; `objectColour` is null in the volume. False if none of it is seen.
-bool PathTracer::meetFirst(Path& path, const Vec3f& weight, double distance,
-                           const Vec3f* objectColour) const {
+// Notes what the camera sees first. False if none of it is seen.
+bool PathTracer::meetFirst(Path& path, const Vec3f& weight, double distance, const Vec3f& albedo,
+                           bool isOfObject) {
   path.held = path.foreground.heldAt(distance);
   const Vec3f opacity = weight * path.held;
   path.event = {float(distance * path.foreground.cosine), (opacity.x + opacity.y + opacity.z) / 3, {}};
-  path.albedo = path.foreground.opacity * scene_.medium.albedo +
-                opacity * (objectColour ? *objectColour : scene_.medium.albedo);
+  path.foreground.albedo += opacity * albedo;
   path.foreground.opacity += opacity;
-  path.isOfObject = objectColour;
+  path.isOfObject = isOfObject;
   return path.held > 0;
 }
 
@@ -329,7 +330,7 @@ void PathTracer::finish(Wave& wave, std::vector<PathSums>& sums) const {
     PathSums& sum = sums[path.pixel];
     const bool isMet = path.scatterings > 0;
     sum.opacity += Vec3d(path.foreground.opacity);
-    sum.albedo += Vec3d(isMet ? path.albedo : path.foreground.opacity * scene_.medium.albedo);
+    sum.albedo += Vec3d(path.foreground.albedo);
     sum.emission += path.emission + path.laterEmission;
     Vec3d colour = path.laterEmission;
     for (std::size_t light = 0; light != layers_; ++light) {

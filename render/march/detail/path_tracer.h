@@ -49,7 +49,6 @@ class PathTracer {
     Foreground foreground{};
     DeepPixel::Event event{};
     float held = 1.0f;
-    Vec3f albedo{};
     bool isOfObject = false;
     Vec3d emission{}, laterEmission{};
   };
@@ -102,7 +101,8 @@ class PathTracer {
   Ray inVolume(const Path& path, const Ray& ray) const;
   void prepareFlight(Path& path, std::optional<Surfaces::Hit>& hit, Flight& flight) const;
   bool arrive(std::uint32_t index, Flight& flight, const std::optional<Surfaces::Hit>& hit, Wave& wave) const;
-  bool meetFirst(Path& path, const Vec3f& weight, double distance, const Vec3f* objectColour) const;
+  static bool meetFirst(Path& path, const Vec3f& weight, double distance, const Vec3f& albedo,
+                        bool isOfObject);
   bool survives(Path& path) const;
   bool scatter(std::uint32_t index, const Meeting& meeting, Wave& wave) const;
   float shareOf(const Meeting& meeting, const Vec3f& towards) const;

@@ -194,7 +194,7 @@ void PathVolume::fly(Flight& flight) const {
       [](float, const Interval&) { return true; });
 }
 
-bool PathVolume::isReal(Flight& flight, const Vec3f& real, double distance) {
+bool PathVolume::isReal(Flight& flight, const Vec3f& real, double distance) const {
   const float sum = flight.weight.x + flight.weight.y + flight.weight.z;
   const float chance = dot(flight.weight, real) / sum;
   if (flight.random.next() < chance) {
@@ -204,8 +204,11 @@ bool PathVolume::isReal(Flight& flight, const Vec3f& real, double distance) {
   }
   const Vec3f before = flight.weight;
   flight.arriving = flight.weight = flight.weight * (Vec3f{1, 1, 1} - real) / (1 - chance);
-  if (flight.foreground)
-    flight.foreground->opacity += (before - flight.weight) * flight.foreground->heldAt(distance);
+  if (flight.foreground) {
+    const Vec3f opacity = (before - flight.weight) * flight.foreground->heldAt(distance);
+    flight.foreground->opacity += opacity;
+    flight.foreground->albedo += opacity * albedoAt(flight.ray.origin + flight.ray.direction * distance);
+  }
   return false;
 }
 

@@ -72,7 +72,7 @@ class PathVolume {
 
   // A tentative collision is real by a chance between those of the colours, `real`, and their weights make up
   // for it (spectral tracking, Kutz, Habel, Li and Novak 2017).
-  static bool isReal(Flight& flight, const Vec3f& real, double distance);
+  bool isReal(Flight& flight, const Vec3f& real, double distance) const;
   // Adds what glows at a tentative collision, over the bound that it was drawn for.
   void addGlow(Flight& flight, const Vec3f& emission, float bound, double distance) const;
   // How much of the largest density above the least one a density is.

@@ -16,8 +16,8 @@ struct Foreground {
   HoldoutCurve holdout{};
   /// Of the angle between the ray and the line of sight.
   double cosine = 1.0;
-  /// Opacity that is seen, per colour.
-  Vec3f opacity{};
+  /// Opacity that is seen, per colour, and the same times the albedo there.
+  Vec3f opacity{}, albedo{};
   /// What glows on the way, for deep pictures; null where nobody asks.
   std::vector<DeepPixel::Event>* glow = nullptr;
 

@@ -262,7 +262,9 @@ std::uint64_t Picture::gather(int index, Scratch& scratch) const {
       opacity = {result.heldOpacity[0], result.heldOpacity[1], result.heldOpacity[2]};
     out.alpha += share * (scene_.hasExtinctionColour() ? (opacity.x + opacity.y + opacity.z) / 3 : opacity.x);
     out.opacity += opacity * share;
-    out.albedo += opacity * lit_.medium.albedo * share;
+    const float* coloured = result.colouredOpacity;
+    const Vec3f scattering = scene_.hasColour() ? Vec3f{coloured[0], coloured[1], coloured[2]} : opacity;
+    out.albedo += scattering * lit_.medium.albedo * share;
     for (int c = 0; c != 3; ++c) out.emission[c] += share * result.emission[c];
     out.depth = std::min(out.depth, result.distance * rays[i].cosine);
     for (std::size_t light = 0; light != lit_.gains.size(); ++light)

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 
@@ -126,6 +127,28 @@ TEST_F(PngLight, IsTheSameForGreyAndForSixteenBits) {
   EXPECT_NEAR(grey(pngChunk("gAMA", bigEndian(100000))), value, 1e-6);
   const std::string square = "curv" + kZeros + bigEndian(1) + std::string("\2\0", 2);
   EXPECT_NEAR(grey(profileChunk(profileOf(square, true))), value * value, 1e-6);
+}
+
+TEST_F(PngLight, IsMultipliedByTheOpacity) {
+  picture_.width = 2;
+  picture_.colourType = 6;
+  picture_.rows = std::string("\0\xff\x80\0\x40\xff\xff\xff\0", 9);
+  std::ofstream(path_, std::ios::binary) << picture_.with("");
+  const auto expectPixel = [](const Image& image, int x, const std::array<double, 4>& values) {
+    for (std::size_t c = 0; c != 4; ++c)
+      EXPECT_NEAR(image.at(std::string(1, "RGBA"[c]), x, 0), values[c], 1e-6);
+  };
+  const double opacity = 64 / 255.0;
+  const Image image = readLinearImage(path_);
+  expectPixel(image, 0, {opacity, srgbLight(128 / 255.0) * opacity, 0, opacity});
+  expectPixel(image, 1, {0, 0, 0, 0});
+  expectPixel(readLinearImage(path_, ColourEncoding::linear), 0,
+              {opacity, 128 / 255.0 * opacity, 0, opacity});
+  // Grey with opacity.
+  picture_.colourType = 4;
+  picture_.rows = std::string("\0\x80\x40\xff\0", 5);
+  std::ofstream(path_, std::ios::binary) << picture_.with("");
+  EXPECT_NEAR(readLinearImage(path_).at("G", 0, 0), srgbLight(128 / 255.0) * opacity, 1e-6);
 }
 
 TEST_F(PngLight, IsThatOfSkies) {

@@ -182,6 +182,23 @@ TEST(DeepShadow, LightsAPictureAsTheVolumeDoes) {
               0.04f * bright);
 }
 
+TEST(DeepShadow, RefusesLightsThatItWasNotMadeFor) {
+  const RenderVolume volume(ball(1, 0.1f));
+  DistantLight sun{"sun", {1, 0.7f, 0.4f}, {1, 1, 1}};
+  LocalLight lamp;
+  lamp.position = {0, 5, 0.5f};
+  const DeepShadowMap ofSun(volume, sun, 4, {2e-3f}), ofLamp(volume, lamp, 4, {2e-3f});
+  // Rounded, and of another length.
+  sun.direction = sun.direction * 3.00001f;
+  lamp.position.x += 1e-6f;
+  EXPECT_NO_THROW(ofSun.requireMadeFor(sun, "a.exr"));
+  EXPECT_NO_THROW(ofLamp.requireMadeFor(lamp, "a.exr"));
+  sun.direction.x = 2;
+  lamp.position.x = 1;
+  EXPECT_THROW(ofSun.requireMadeFor(sun, "a.exr"), Error);
+  EXPECT_THROW(ofLamp.requireMadeFor(lamp, "a.exr"), Error);
+}
+
 TEST(DeepShadow, RefusesWhatItCannotSee) {
   const RenderVolume volume(ball(1, 0.1f));
   LocalLight inside;

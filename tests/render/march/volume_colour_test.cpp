@@ -116,6 +116,30 @@ TEST(VolumeColour, ConstantColourActsAsAnAlbedo) {
   for (int c = 0; c != 3; ++c) EXPECT_NEAR(found[c] / expected[c], 1, 1e-3) << c;
 }
 
+TEST(VolumeColour, IsInTheLayerOfTheAlbedo) {
+  // A slab of one colour, so that the layer is that times the medium's albedo and the opacity of every
+  // colour.
+  const auto grid = slab(2.1f, 4.0f, 0.1f, 0.5f);
+  const Vec3f colour{0.9f, 0.5f, 0.2f};
+  const RenderVolume volume(grid, {coloured(*grid, colour), {}});
+  for (const Vec3f& extinctionColour : {Vec3f{1, 1, 1}, Vec3f{0.5f, 1, 2}}) {
+    Medium its = medium(0.8f, 0.99f);
+    its.extinctionColour = extinctionColour;
+    RenderOptions options = single();
+    options.aovs = {"transmittance", "albedo"};
+    PathOptions paths;
+    static_cast<FrameOptions&>(paths) = options;
+    paths.samplesPerPixel = 4096;
+    const Lights sky{{}, {1, 1, 1}};
+    const Image marched = renderImage(volume, its, sky, needle(), options).image,
+                traced = pathTraceImage(volume, its, sky, needle(), paths).image;
+    for (const Image* image : {&marched, &traced}) {
+      const Vec3f found = pixel(*image, "albedo."), through = pixel(*image, "transmittance.");
+      for (int c = 0; c != 3; ++c) EXPECT_NEAR(found[c], 0.99f * colour[c] * (1 - through[c]), 3e-4f) << c;
+    }
+  }
+}
+
 TEST(VolumeColour, PathsAgreeWithTheMarcherOnceScattered) {
   // Colour changes from red to blue across the volume; single scattering, both ways, within 4 standard
   // errors of 40000 paths (relative 0.01 each, from the spread of ten seeds).

@@ -29,6 +29,12 @@ Image picture(int width, int height, const std::function<Vec3f(int, int)>& colou
   return image;
 }
 
+TEST(Texture, LiesOnWhiteWhereItIsTransparent) {
+  Image image = picture(1, 1, [](int, int) { return Vec3f{0.25f, 0.125f, 0}; });
+  image.channels[3].values[0] = 0.25f;
+  EXPECT_EQ(Texture(image).at(0.5, 0.5), (Vec3f{1, 0.875f, 0.75f}));
+}
+
 TEST(Texture, IsExactAtTexelsAndRepeats) {
   const Image image = picture(5, 3, [](int x, int y) { return Vec3f{float(x), float(y), 1}; });
   const Texture texture(image);

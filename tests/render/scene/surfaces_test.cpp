@@ -149,6 +149,10 @@ TEST(Surfaces, ShowCheckersAndTextures) {
   EXPECT_NEAR(colourAt(0.5, 0.5), 0.2f, 1e-6f);
   EXPECT_NEAR(colourAt(0.5, -0.5), 0.4f, 1e-6f);
   EXPECT_NEAR(colourAt(0, 0), 0.25f, 1e-6f);
+  // Through what is half transparent half of the object's own colour is seen.
+  texture->add("A").values.assign(4, 0.5f);
+  object.colour = {0.6f, 1, 1};
+  EXPECT_NEAR(colourAt(-0.5, 0.5), 0.6f * (0.1f + 0.5f), 1e-6f);
 }
 
 TEST(Surfaces, RefuseWhatCannotBeDrawn) {
