@@ -148,11 +148,15 @@ bool useToml(const Input& input) {
   std::vector<std::string> arguments = call.needed;
   arguments.insert(arguments.end(), {"--config", input.path});
   isRead = mayFailOrShow("", [&] { parse(verb, arguments); }) || isRead;
-  mayFailOrShow(input.path, [&] {
-    CLI::App fresh("", verb.name);
-    const apps::BoundVerb bound = verb.bind(fresh);
-    apps::checkConfigFile({fresh, verb.name, verbNames()}, {"--config", input.path}, fresh);
-  });
+  // Options of a file that is good may still exclude those of the call.
+  isRead =
+      mayFailOrShow(input.path,
+                    [&] {
+                      CLI::App fresh("", verb.name);
+                      const apps::BoundVerb bound = verb.bind(fresh);
+                      apps::checkConfigFile({fresh, verb.name, verbNames()}, {"--config", input.path}, fresh);
+                    }) ||
+      isRead;
   return isRead;
 }
 
