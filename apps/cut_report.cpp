@@ -25,8 +25,7 @@ void reportKnives(const Pieces& pieces, const CutKnives& knives, Run& run) {
                             [&](const auto& piece) { return side(piece) == side(pieces.pieces[0]); }))
       missing.push_back(knives.names[k]);
   }
-  // Where a part is left out, or a kerf takes it, the knife may have parted it.
-  const char* const ofWhat = pieces.slivers > 0 || knives.options.kerf > 0 ? " that is left" : "";
+  const char* const ofWhat = areSomeGone(pieces, knives) ? " that is left" : "";
   if (missing.size() > 3)
     run.note(fmt::format("{} of {} knives part nothing{}", missing.size(), knives.names.size(), ofWhat));
   else
@@ -49,6 +48,10 @@ nlohmann::json statistics(const Pieces& pieces) {
 }
 
 }  // namespace
+
+bool areSomeGone(const Pieces& pieces, const CutKnives& knives) {
+  return pieces.slivers > 0 || knives.options.kerf > 0;
+}
 
 void report(const Pieces& pieces, const CutKnives& knives, Run& run) {
   reportKnives(pieces, knives, run);

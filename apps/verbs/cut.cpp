@@ -43,13 +43,12 @@ void cut(const CutArguments& arguments, Run& run) {
     writePng(arguments.preview, picturePieces(pieces, picture, run), {}, run.metadata());
   }
   reportCrossings(crossings.get(), run);
+  const char* const what = pieces.pieces.size() > 1      ? "pieces"
+                           : areSomeGone(pieces, knives) ? "piece"
+                                                         : "piece: no knife parts the model";
   run.result(fmt::format("{}: {} {}, volume {:g} (of {:g})",
                          arguments.folder.empty() ? arguments.preview : arguments.folder,
-                         pieces.pieces.size(),
-                         pieces.pieces.size() > 1                        ? "pieces"
-                         : pieces.slivers > 0 || knives.options.kerf > 0 ? "piece"
-                                                                         : "piece: no knife parts the model",
-                         pieces.volumeSum, pieces.volumeOriginal));
+                         pieces.pieces.size(), what, pieces.volumeSum, pieces.volumeOriginal));
 }
 
 }  // namespace

@@ -239,16 +239,6 @@ Box voxelsBox(const Grid& grid) {
   return places.box();
 }
 
-/// What `visit` makes of the grid as what it is; nothing for grids of other values than numbers and vectors.
-template <class Visit>
-std::optional<Box> visited(const openvdb::GridBase& grid, const Visit& visit) {
-  std::optional<Box> result;
-  using Grids =
-      openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Vec3SGrid, openvdb::Vec3DGrid>;
-  grid.apply<Grids>([&](const auto& typed) { result = visit(typed); });
-  return result;
-}
-
 bool isAlongAxes(const openvdb::math::Transform& transform) {
   const openvdb::Mat3d linear = detail::matrixOf(transform).getMat3();
   for (int row = 0; row != 3; ++row)
@@ -260,16 +250,15 @@ bool isAlongAxes(const openvdb::math::Transform& transform) {
 }  // namespace
 
 Box contentBox(const VdbGrid& grid) {
+  using Numbers = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid>;
+  using Values = Numbers::Append<openvdb::Vec3SGrid, openvdb::Vec3DGrid>;
   const openvdb::GridBase& base = *grid.impl().grid;
-  if (base.getGridClass() == openvdb::GRID_LEVEL_SET) {
-    std::optional<Box> surface;
-    if (base.isType<openvdb::FloatGrid>()) surface = surfaceBox(static_cast<const openvdb::FloatGrid&>(base));
-    if (base.isType<openvdb::DoubleGrid>())
-      surface = surfaceBox(static_cast<const openvdb::DoubleGrid&>(base));
-    if (surface && !surface->isEmpty()) return *surface;
-  }
-  if (base.transform().isLinear() && !isAlongAxes(base.transform()))
-    if (const auto box = visited(base, [](const auto& typed) { return voxelsBox(typed); })) return *box;
+  Box box;
+  if (base.getGridClass() == openvdb::GRID_LEVEL_SET)
+    base.apply<Numbers>([&](const auto& level) { box = surfaceBox(level); });
+  if (box.isEmpty() && base.transform().isLinear() && !isAlongAxes(base.transform()))
+    base.apply<Values>([&](const auto& values) { box = voxelsBox(values); });
+  if (!box.isEmpty()) return box;
   PlacesBox corners(base.transform());
   if (const openvdb::CoordBBox voxels = base.evalActiveVoxelBoundingBox(); !voxels.empty())
     corners.includeCorners(voxels);
