@@ -1,14 +1,18 @@
 #include "apps/options/advect_options.h"
 
+#include <fmt/format.h>
+
 namespace nephele::apps {
 
 AdvectionOptions AdvectArguments::resolved() const {
   AdvectionOptions result = advection;
-  if (result.method != AdvectionMethod::selma) {
-    if (!map.empty()) throw CLI::ValidationError("--map", "only --method selma makes a map");
-    if (!continueFrom.empty())
-      throw CLI::ValidationError("--continue-from", "only --method selma goes on from a map");
-  }
+  const auto isOnlyOf = [&](const std::vector<const CLI::Option*>& options, const char* name) {
+    for (const CLI::Option* option : options)
+      if (option->count() > 0)
+        throw CLI::ValidationError(option->get_name(), fmt::format("is for --method {} alone", name));
+  };
+  if (result.method != AdvectionMethod::selma) isOnlyOf(ofMap, "selma");
+  if (result.method != AdvectionMethod::grid) isOnlyOf({ofGrid}, "grid");
   result.steps = steps;
   result.dt = float(dt);
   result.mapCoarseness = float(mapCoarseness);
@@ -43,7 +47,7 @@ void addAdvectOptions(CLI::App& app, AdvectArguments& a) {
       {{"selma", Method::selma}, {"gridless", Method::gridless}, {"grid", Method::grid}},
       "Carry a map and read the input through it; trace every voxel through all steps; or carry "
       "the values themselves.");
-  addChoice<GridScheme>(
+  a.ofGrid = addChoice<GridScheme>(
       app, "--scheme", a.advection.scheme,
       {{"maccormack", GridScheme::macCormack}, {"bfecc", GridScheme::bfecc}, {"plain", GridScheme::plain}},
       "How --method grid makes a step.");
@@ -52,12 +56,16 @@ void addAdvectOptions(CLI::App& app, AdvectArguments& a) {
   auto* from = app.add_option("--continue-from", a.continueFrom,
                               "Go on from a map that --map wrote for the same input.")
                    ->type_name("FILE");
-  addCount(app, "--map-coarseness", a.mapCoarseness, 1, 64, "Voxel of the map, in voxels of the finest grid.")
-      ->excludes(from);
-  addNumber(app, "--rebake", a.rebake, 0, 100,
-            "Percent of the map that may fold before the values are baked and a new map starts; 100: never.")
-      ->excludes(map)
-      ->excludes(from);
+  auto* coarseness = addCount(app, "--map-coarseness", a.mapCoarseness, 1, 64,
+                              "Voxel of the map, in voxels of the finest grid.")
+                         ->excludes(from);
+  auto* rebake =
+      addNumber(
+          app, "--rebake", a.rebake, 0, 100,
+          "Percent of the map that may fold before the values are baked and a new map starts; 100: never.")
+          ->excludes(map)
+          ->excludes(from);
+  a.ofMap = {map, from, coarseness, rebake};
 }
 
 }  // namespace nephele::apps

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "apps/app.h"
 #include "apps/options/velocity_options.h"
@@ -14,6 +15,9 @@ struct AdvectArguments {
   VelocityArguments velocity;
   int steps = 1, mapCoarseness = 1;
   double dt = 1, rebake = 5;
+  /// Options that say nothing to other methods.
+  const CLI::Option* ofGrid = nullptr;
+  std::vector<const CLI::Option*> ofMap;
   /// What needs no conversion; the rest is filled in by `resolved`.
   AdvectionOptions advection;
 

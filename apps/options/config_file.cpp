@@ -151,14 +151,20 @@ const Setting::Value* valueIn(const Setting& setting, const std::string& message
   return !isOfExpression && setting.values.size() == 1 ? &setting.values.front() : nullptr;
 }
 
-// What a look says of the verb, but for what does not go with what was typed: it is the look of another
-// shape, or at another resolution, then.
-std::vector<std::string> withLook(const ConfiguredVerb& verb, const std::string& name,
-                                  std::vector<std::string> arguments) {
-  const TomlFile file("the look " + name, lookText(name));
+std::vector<Setting> settingsOfLook(const ConfiguredVerb& verb, const TomlFile& file,
+                                    const std::string& name) {
   const toml::table* own = file.table()[verb.name].as_table();
   if (!own && verb.name == "turntable") own = file.table()["render"].as_table();
   if (!own) throw CLI::ValidationError("--look", fmt::format("'{}' says nothing of {}", name, verb.name));
+  std::vector<Setting> settings;
+  for (const auto& [key, value] : *own) settings.push_back(settingOf(verb, file, key, value));
+  return settings;
+}
+
+// Adds what `arguments` do not set, but for what does not go with them: the settings are those of another
+// shape, or at another resolution, then.
+void addFitting(const ConfiguredVerb& verb, const std::vector<Setting>& settings,
+                std::vector<std::string>& arguments) {
   const bool hasOwnInput = hasInput(verb.app, arguments);
   const std::vector<std::string> typed = arguments;
   std::vector<const CLI::Option*> left;
@@ -170,15 +176,13 @@ std::vector<std::string> withLook(const ConfiguredVerb& verb, const std::string&
   };
   // What others need comes first.
   for (const bool needs : {false, true})
-    for (const auto& [key, value] : *own) {
-      const Setting setting = settingOf(verb, file, key, value);
+    for (const Setting& setting : settings) {
       if (setting.option.get_needs().empty() == needs) continue;
       if (!fits(setting.option))
         left.push_back(&setting.option);
       else if (!isGiven(setting.option, typed))
         add(setting, arguments);
     }
-  return arguments;
 }
 
 }  // namespace
@@ -196,9 +200,12 @@ std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<
   const std::optional<std::string> path = givenTo("--config", arguments), look = givenTo("--look", arguments);
   if (path) {
     TomlFile file = TomlFile::read("--config", *path);
-    for (const Setting& setting : settingsOf(verb, file, std::vector(arguments))) add(setting, arguments);
+    addFitting(verb, settingsOf(verb, file, arguments), arguments);
   }
-  if (look) arguments = withLook(verb, *look, std::move(arguments));
+  if (look) {
+    const TomlFile file("the look " + *look, lookText(*look));
+    addFitting(verb, settingsOfLook(verb, file, *look), arguments);
+  }
   return arguments;
 }
 

@@ -18,9 +18,10 @@ struct ConfiguredVerb {
 };
 
 /// Adds to `arguments` (those of one verb, in order) the options that the TOML file named by --config sets
-/// and that the arguments do not: the command line wins. Keys are option names without dashes; `true` stands
-/// for a flag, an array for an option that is repeated; old names do. A table named after a verb is for that
-/// verb alone. Then the same of the look named by --look, as far as it goes with what is there.
+/// and that the arguments do not, as far as they go with these: the command line wins, over what excludes
+/// what is typed, too. Keys are option names without dashes; `true` stands for a flag, an array for an option
+/// that is repeated; old names do. A table named after a verb is for that verb alone. Then the same of the
+/// look named by --look.
 /// @throws felt::ScriptError with all keys that the verb does not have, and values that no option takes;
 /// CLI::ParseError naming the file that cannot be read, or the look.
 std::vector<std::string> withConfigFile(const ConfiguredVerb& verb, std::vector<std::string> arguments);

@@ -101,13 +101,10 @@ std::string libraries(const Pieces& pieces, const std::string& folder) {
   for (const Piece& piece : pieces.pieces)
     for (const std::string& file : piece.mesh.materialFiles)
       if (fs::path(file).filename() != kMaterials) files.insert(file);
-  std::string text = fmt::format("mtllib {}\n", kMaterials);
-  std::error_code ignored;
-  for (const std::string& file : files) {
-    const fs::path relative = fs::proximate(file, folder, ignored);
-    text += fmt::format("mtllib {}\n", (relative.empty() ? fs::path(file) : relative).generic_string());
-  }
-  return text;
+  TextWriter text;
+  text.text(fmt::format("mtllib {}\n", kMaterials));
+  detail::writeObjLibraries(text, {files.begin(), files.end()}, folder);
+  return text.take();
 }
 
 class PieceWriter {
@@ -161,7 +158,7 @@ class PieceWriter {
               continue;
             }
             TextWriter faces;
-            detail::writeObjFaces(faces, mesh, texts[i].uv, {.groups = true, .materials = true});
+            detail::writeObjFaces(faces, mesh, texts[i].uv);
             const std::string head = fmt::format("{}o {}\n", libraries_, pieces_.pieces[i].name);
             writeText(temporary, names_[i],
                       std::vector<std::string_view>{head, texts[i].points, faces.kept()});
@@ -176,8 +173,8 @@ class PieceWriter {
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
             TextWriter faces;
-            detail::writeObjFaces(faces, withMaterials(pieces_.pieces[i].mesh), texts[i].uv,
-                                  {.groups = false, .materials = true}, points[i], coordinates[i]);
+            detail::writeObjFaces(faces, withMaterials(pieces_.pieces[i].mesh), texts[i].uv, false, points[i],
+                                  coordinates[i]);
             texts[i].faces = faces.take();
           }
         },

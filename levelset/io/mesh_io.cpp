@@ -242,18 +242,20 @@ Mesh readMesh(const std::string& path) {
 void writeMesh(const std::string& path, const Mesh& mesh) {
   namingFile(path, [&] { requireWritable(requireValid(mesh), detail::lowerExtension(path) == ".stl"); });
   const std::string extension = detail::lowerExtension(path);
-  void (*write)(std::FILE*, const Mesh&) = extension == ".obj"   ? detail::writeObj
-                                           : extension == ".ply" ? detail::writePly
-                                           : extension == ".stl" ? detail::writeStl
-                                                                 : nullptr;
-  require(write != nullptr,
+  const bool isObj = extension == ".obj", isPly = extension == ".ply";
+  require(isObj || isPly || extension == ".stl",
           fmt::format("cannot write {}: unknown mesh format '{}'; .obj, .ply and .stl can be written", path,
                       extension));
 
   if (MemoryFile::put(path, [&] { return std::make_shared<const Mesh>(mesh); })) return;
   OutputFile output(path);
   OutputStream stream(output);
-  namingFile(path, [&] { write(stream.file(), mesh); });
+  namingFile(path, [&] {
+    if (isObj)
+      detail::writeObj(stream.file(), mesh, std::filesystem::path(path).parent_path().string());
+    else
+      (isPly ? detail::writePly : detail::writeStl)(stream.file(), mesh);
+  });
   stream.close();
   output.commit();
 }

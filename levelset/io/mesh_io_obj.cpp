@@ -176,8 +176,9 @@ Mesh readObj(const MeshFile& file) {
   return ObjReader(file).read();
 }
 
-void writeObj(std::FILE* stream, const Mesh& mesh) {
+void writeObj(std::FILE* stream, const Mesh& mesh, const std::string& folder) {
   TextWriter out(stream);
+  writeObjLibraries(out, mesh.materialFiles, folder);
   const ObjCoordinates uv = writeObjPoints(out, mesh);
   writeObjFaces(out, mesh, uv);
 }

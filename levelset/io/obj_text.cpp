@@ -7,6 +7,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <span>
 #include <unordered_map>
 
@@ -93,15 +94,27 @@ ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& of
   return result;
 }
 
-void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, ObjLines lines,
+void writeObjLibraries(TextWriter& out, const std::vector<std::string>& files, const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  for (const std::string& file : files) {
+    // Absolute, as relative paths of which nothing exists stay relative.
+    const fs::path relative =
+        fs::proximate(fs::absolute(file, ignored), folder.empty() ? "." : folder, ignored);
+    out.text("mtllib ").text(oneLine(relative.empty() ? file : relative.generic_string())).text("\n");
+  }
+}
+
+void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, bool areGroupsNamed,
                    std::uint64_t vertices, std::uint64_t coordinates) {
   std::size_t group = 0;
+  std::string material;
   for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
     for (; group < mesh.groups.size() && mesh.groups[group].firstFace <= f; ++group) {
       const MeshGroup& begun = mesh.groups[group];
-      if (lines.groups) out.text("g ").text(oneLine(begun.name)).text("\n");
-      if (lines.materials && !begun.material.empty())
-        out.text("usemtl ").text(oneLine(begun.material)).text("\n");
+      if (areGroupsNamed) out.text("g ").text(oneLine(begun.name)).text("\n");
+      if (begun.material != material) out.text("usemtl ").text(oneLine(begun.material)).text("\n");
+      material = begun.material;
     }
     out.text("f");
     for (std::uint32_t c = mesh.faceStart[f]; c < mesh.faceStart[f + 1]; ++c) {

@@ -53,15 +53,12 @@ struct ObjCoordinates {
 /// @throws Error if a colour or texture coordinate is not: no reader takes such a number.
 ObjCoordinates writeObjPoints(TextWriter& out, const Mesh& mesh, const Vec3d& offset = {});
 
-/// Which lines stand in front of the faces of a group.
-struct ObjLines {
-  bool groups = true;
-  bool materials = false;
-};
+/// Lines `mtllib` of the files of materials, as seen from the folder of the .obj.
+void writeObjLibraries(TextWriter& out, const std::vector<std::string>& files, const std::string& folder);
 
-/// Lines `f`, for points that are not the first of their file: `vertices` and `coordinates` of them came
-/// before.
-void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, ObjLines lines = {},
+/// Lines `f`, behind `usemtl` where the material changes, and behind `g` unless groups are not named; for
+/// points that are not the first of their file: `vertices` and `coordinates` of them came before.
+void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, bool areGroupsNamed = true,
                    std::uint64_t vertices = 0, std::uint64_t coordinates = 0);
 
 }  // namespace nephele::detail

@@ -226,6 +226,9 @@ TEST_F(AdvectVerb, BadOptionsAreUsageErrorsThatNameThem) {
   EXPECT_EQ(advect("out.vdb", "--velocity noise --method grid --map " + file("m.vdb")).exitCode, 2);
   EXPECT_EQ(advect("out.vdb", "--velocity noise --method gridless --continue-from m.vdb").exitCode, 2);
   EXPECT_EQ(advect("out.vdb", "--velocity noise --rebake 3 --map " + file("m.vdb")).exitCode, 2);
+  for (const std::string other :
+       {"--scheme bfecc", "--method grid --rebake 3", "--method gridless --map-coarseness 2"})
+    EXPECT_EQ(advect("out.vdb", "--velocity noise " + other).exitCode, 2) << other;
 }
 
 }  // namespace

@@ -213,6 +213,11 @@ TEST(Program, ConfigFileSetsOptionsAndTheCommandLineWins) {
   ASSERT_EQ(runProgram(common + " --resolution 48").exitCode, 0);
   const double fine = nlohmann::json::parse(textOf(folder.file("stats.json")))["grid"]["voxel_size"];
   EXPECT_NEAR(coarse / fine, 2.0, 1e-6) << "48 voxels along a side are twice as small as 24";
+  // What excludes an option of the file takes its place as well.
+  ASSERT_EQ(runProgram(common + " --voxel-size 0.125").exitCode, 0);
+  EXPECT_EQ(nlohmann::json::parse(textOf(folder.file("stats.json")))["grid"]["voxel_size"], 0.125);
+  std::ofstream(folder.file("options.toml")) << "resolution = 24\nvoxel-size = 0.1\n";
+  EXPECT_EQ(runProgram(common).exitCode, 2);
 }
 
 TEST(Program, FilesSayWhatWasTypedAndWhatAConfigFileGave) {

@@ -34,7 +34,8 @@ Mesh readOff(const MeshFile& file);
 /// glTF 2, text or binary; external buffers are looked for beside the file.
 Mesh readGltf(const MeshFile& file);
 
-void writeObj(std::FILE* stream, const Mesh& mesh);
+/// `folder` is where the file will be: files of materials are named as seen from there.
+void writeObj(std::FILE* stream, const Mesh& mesh, const std::string& folder);
 void writePly(std::FILE* stream, const Mesh& mesh);
 void writeStl(std::FILE* stream, const Mesh& mesh);
 

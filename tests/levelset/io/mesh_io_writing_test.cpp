@@ -108,6 +108,30 @@ TEST(MeshIo, ObjRoundTripKeepsEverythingItCanHold) {
   EXPECT_EQ(back.groups[1].firstFace, 2u);
 }
 
+// A statement `usemtl` holds until the next.
+TEST(MeshIo, ObjNamesMaterialsAndTheirFilesAsSeenFromItsFolder) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.file("made/here"));
+  Mesh mesh = decorated();
+  mesh.groups = {{"lid", 0, 1, "red"}, {"side", 1, 1, "dark blue"}, {"back", 2, 1, ""}};
+  mesh.materialFiles = {folder.file("made/a b.mtl"), folder.file("c.mtl"), "nowhere/d.mtl"};
+  const std::string path = folder.file("made/here/a.obj");
+  writeMesh(path, mesh);
+  const std::string text = test::textOf(path);
+  EXPECT_TRUE(text.starts_with("mtllib ../a b.mtl\nmtllib ../../c.mtl\nmtllib ../")) << text;
+  const Mesh back = readMesh(path);
+  ASSERT_EQ(back.groups.size(), 3u);
+  for (int g = 0; g < 3; ++g) {
+    EXPECT_EQ(back.groups[g].name, mesh.groups[g].name);
+    EXPECT_EQ(back.groups[g].material, mesh.groups[g].material);
+    EXPECT_EQ(back.groups[g].firstFace, mesh.groups[g].firstFace);
+  }
+  ASSERT_EQ(back.materialFiles.size(), 3u);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_EQ(std::filesystem::path(back.materialFiles[i]).lexically_normal(),
+              std::filesystem::absolute(mesh.materialFiles[i]));
+}
+
 TEST(MeshIo, PlyRoundTripKeepsPolygonsAttributesAndDigits) {
   const TemporaryFolder folder;
   const Mesh mesh = decorated();
