@@ -41,6 +41,8 @@ class DomainNode final : public FieldNode<T> {
   static constexpr int kLanes = kComponents<T>;
   /// The first sample along an edge, voxels.
   static constexpr float kFirst = kLayers;
+  /// What lies on a face of the domain is as near to it as this, in voxels, where it is outside by rounding.
+  static constexpr float kOnFace = 1e-3f;
 
   DomainNode(const Domain& domain, const std::array<Grid, kLanes>& grids)
       : toVoxel_(inverse(voxelToWorld(domain))),
@@ -117,7 +119,7 @@ class DomainNode final : public FieldNode<T> {
         const float at = m(a, 0) * points.x[i] + m(a, 1) * points.y[i] + m(a, 2) * points.z[i] + t;
         const float notBelow = at < kFirst ? kFirst : at;
         q[a][i] = notBelow > last ? last : notBelow;
-        if constexpr (kMarks) stays[a][i] = q[a][i] == at ? 1.0f : 0.0f;
+        if constexpr (kMarks) stays[a][i] = std::abs(q[a][i] - at) <= kOnFace ? 1.0f : 0.0f;
       }
     }
   }

@@ -6,6 +6,7 @@
 namespace nephele::felt {
 
 void addLevelsetFunctions(Registry& registry) {
+  registry.beginData();
   addCacheFunctions(registry);
   addMeshFunctions(registry);
   addFileFunctions(registry);

@@ -12,7 +12,7 @@ struct BakeOptions {
   /// Edge of a voxel, world units, > 0. Voxel centres lie at integer multiples of it.
   float voxelSize = 0.0f;
   /// Where to look, world units: all voxels that interpolation inside the box needs; outside them the result
-  /// is `background`.
+  /// is `background`. Gradients of trilinear values look a voxel farther, so that they hold a voxel inside.
   Box box;
   /// Values that matter. Where the field lies wholly above or below, the grid holds one constant on that
   /// side: the nearer end of the band. Bricks that the band enters keep true values. Default: everything

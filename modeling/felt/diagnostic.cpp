@@ -183,7 +183,8 @@ ScriptError::ScriptError(std::vector<Diagnostic> diagnostics, const Sources& sou
 
 bool ScriptError::isOfScript() const {
   return std::any_of(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic& diagnostic) {
-    return diagnostic.code != Code::failed && diagnostic.severity == Severity::error;
+    return diagnostic.severity == Severity::error && diagnostic.code != Code::failed &&
+           diagnostic.code != Code::importFailed;
   });
 }
 

@@ -67,8 +67,8 @@ class Loader {
       path = std::filesystem::path(sources_[statement.span.file].name()).parent_path() / path;
     if (!seen_.insert(canonical(path.string())).second) return;
     if (seen_.size() > kMostFiles) {
-      diagnostics_.push_back({Code::importFailed, statement.span,
-                              "more than " + std::to_string(kMostFiles) + " files are imported"});
+      diagnostics_.push_back(
+          {Code::limit, statement.span, "more than " + std::to_string(kMostFiles) + " files are imported"});
       return;
     }
     std::string text;
@@ -315,10 +315,10 @@ Session::Session(const Registry& registry, Context& context, const std::vector<G
 
 Session::~Session() = default;
 
-Named Session::enter(const std::string& text) {
+Named Session::enter(const std::string& text, const std::string& name) {
   Sources& sources = parts_->sources;
   parts_->warnings.clear();
-  const int file = sources.add("line " + std::to_string(sources.count() + 1), text);
+  const int file = sources.add(name, text);
   // A text is an expression if it can be read as one; else what is wrong with it as statements is told.
   std::vector<Diagnostic> ofExpression;
   if (ExpressionPtr expression = parseExpression(sources, file, ofExpression)) {

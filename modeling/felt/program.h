@@ -119,9 +119,10 @@ class Session {
   Session(const Registry& registry, Context& context, const std::vector<Given>& given = {});
   ~Session();
 
-  /// Carries out statements; a text that is one expression gives its value, others nothing.
+  /// Carries out statements; a text that is one expression gives its value, others nothing. Faults are those
+  /// of `name`.
   /// @throws ScriptError with all faults, after which the session can go on; Cancelled.
-  Named enter(const std::string& text);
+  Named enter(const std::string& text, const std::string& name = "input");
   /// What was allowed in the text entered last but is likely a slip, as messages.
   const std::vector<std::string>& warnings() const;
   /// Names of variables, for completion.

@@ -68,6 +68,7 @@ Function& Registry::addGeneral(std::string signature, std::string text, std::str
   function.text = std::move(text);
   function.example = std::move(example);
   function.group = group_;
+  function.isOfData = isOfData_;
   function.result = parsed.declaration.result;
   function.isOpen = parsed.isOpen;
   function.run = std::move(run);

@@ -39,6 +39,8 @@ struct Function {
   bool isOpen = false;
   /// The result holds samples of its arguments, not the arguments.
   bool isSampled = false;
+  /// It reads or writes files or makes grids, so that an error of it need not be the script's fault.
+  bool isOfData = false;
   std::function<Value(Call&)> run;
 };
 
@@ -50,6 +52,8 @@ class Registry {
 
   /// The heading of what is added from now on.
   void group(std::string name) { group_ = std::move(name); }
+  /// What is added from now on reads or writes files or makes grids.
+  void beginData() { isOfData_ = true; }
 
   /// Adds a function that is called with all arguments as values.
   /// @throws Error if the signature cannot be parsed: a fault of the program.
@@ -73,6 +77,7 @@ class Registry {
   static void requireKinds(const Function& function, std::span<const Type> types);
 
   std::string group_;
+  bool isOfData_ = false;
   std::deque<Function> functions_;
   std::multimap<std::string, std::size_t, std::less<>> byName_;
 };

@@ -225,7 +225,7 @@ ScalarField mask(const ScalarField& l) {
 
 ScalarField mask(const ScalarField& l, float edgeThickness) {
   require(edgeThickness > 0 && std::isfinite(edgeThickness),
-          "mask: edgeThickness must be > 0 and finite, got " + numberText(edgeThickness));
+          "mask: the thickness of the edge must be > 0 and finite, got " + numberText(edgeThickness));
   return smoothstep(-0.5f * edgeThickness, 0.5f * edgeThickness, l);
 }
 

@@ -238,8 +238,9 @@ LatticeFacts latticeFacts(LatticeKind kind, bool moves) {
 }
 
 double clockRate(int index, float period) {
-  const double rate = 0.125 + 0.25 * (index + 0.5) / 16;
-  return period > 0 ? std::max(1.0, std::round(rate * period)) / period : rate;
+  // A different place in each sixteenth, by the golden ratio: equal steps would all meet again.
+  const double place = 0.6180339887498949 * (index + 1), rate = (index + place - std::floor(place)) / 32;
+  return period > 0 ? std::max(index < 8 ? 1.0 : 2.0, std::round(rate * period)) / period : rate;
 }
 
 NoiseClock noiseClock(float time, float period) {

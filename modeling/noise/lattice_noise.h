@@ -17,8 +17,9 @@ struct NoiseClock {
   alignas(64) float sine[16];
 };
 
-/// Turns per unit of time: 16 rates evenly spread from 1/8 to 3/8. With a period > 0, each is the nearest
-/// whole number of turns per period, at least one.
+/// Turns per unit of time: 16 rates spread from 0 to 1/2, so that a noise has nothing to do with itself a
+/// unit later. With a period > 0, each is the nearest whole number of turns per period, at least one, of the
+/// upper half two: if all made one, the noise would be its own opposite after half the period.
 double clockRate(int index, float period);
 NoiseClock noiseClock(float time, float period);
 

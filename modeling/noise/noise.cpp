@@ -120,7 +120,7 @@ class SpectralNode final : public FieldNode<float> {
     const Interval hull = coefficientsNear(box.center(), nodes);
     return {std::max(near.min, hull.min), std::min(near.max, hull.max)};
   }
-  float differenceStep() const override { return 0.25f / (tile_.nodesPerUnit * frequency_); }
+  float differenceStep() const override { return 0.05f / (tile_.nodesPerUnit * frequency_); }
 
  private:
   /// Boxes that reach farther from their middle would cost more than they save.

@@ -191,7 +191,7 @@ ScalarField box(const Box& box) {
   requirePoint(box.min, "box", "min");
   requirePoint(box.max, "box", "max");
   require(box.min.x < box.max.x && box.min.y < box.max.y && box.min.z < box.max.z,
-          "box: min must be below max on every axis");
+          "box: the lengths must be > 0 along every axis");
   const Vec3f half = box.size() * 0.5f;
   return shapeField(detail::BoxShape{box.center(), half}, std::min({half.x, half.y, half.z}));
 }
@@ -204,8 +204,8 @@ ScalarField plane(const Vec3f& point, const Vec3f& normal) {
 
 ScalarField torus(const TorusOptions& options) {
   requirePoint(options.center, "torus", "center");
-  requireSize(options.majorRadius, "torus", "majorRadius");
-  requireSize(options.minorRadius, "torus", "minorRadius");
+  requireSize(options.majorRadius, "torus", "radius");
+  requireSize(options.minorRadius, "torus", "radius of the tube");
   const Vec3f axis = direction(options.axis, "torus", "axis");
   return shapeField(detail::TorusShape{options.center, axis, options.majorRadius, options.minorRadius},
                     options.minorRadius);

@@ -16,8 +16,8 @@ BakeWalk<T>::BakeWalk(const BakeOptions& options, const Progress& progress)
   background_.fill(options.background.value_or(std::isfinite(options.band.min) ? options.band.min : 0.0f));
   for (const float value : background_) backgroundSamples_.insert(backgroundSamples_.end(), kOwn, value);
   for (int axis = 0; axis < 3; ++axis) {
-    voxels_.first[axis] = int(std::floor(double(options.box.min[axis]) / options.voxelSize));
-    voxels_.last[axis] = int(std::ceil(double(options.box.max[axis]) / options.voxelSize));
+    voxels_.first[axis] = int(std::floor(double(options.box.min[axis]) / options.voxelSize)) - margin_;
+    voxels_.last[axis] = int(std::ceil(double(options.box.max[axis]) / options.voxelSize)) + margin_;
     // Cells that touch these voxels, so that values fall off to the background without a jump.
     places_.first[axis] = brickOf(voxels_.first[axis] - 2);
     places_.count[axis] = brickOf(voxels_.last[axis] + 1) - places_.first[axis] + 1;

@@ -303,7 +303,7 @@ Value Interpreter::callBuiltIn(const Expression& call) {
   } catch (const CallError& error) {
     fail(error.code(), call.span, error.what(), error.hint());
   } catch (const Error& error) {
-    fail(Code::failed, call.span, error.what());
+    fail(call.function->isOfData ? Code::failed : Code::outOfRange, call.span, error.what());
   }
   if (const void* node = nodeOf(result)) {
     if (!isConstant(result)) result.depth = call.function->isSampled ? 1 : depth + 1;

@@ -88,7 +88,10 @@ struct SquareOp {
 };
 struct SquareRootOp {
   HWY_INLINE V value(V a) const { return hn::Sqrt(a); }
-  HWY_INLINE V chain(V, V v, V g) const { return hn::Mul(hn::Div(constant(0.5f), v), g); }
+  // Infinitely steep at 0, which is nothing to an argument that stays there.
+  HWY_INLINE V chain(V, V v, V g) const {
+    return hn::IfThenZeroElse(hn::Eq(g, hn::Zero(D())), hn::Mul(hn::Div(constant(0.5f), v), g));
+  }
 };
 struct ExponentialOp {
   HWY_INLINE V value(V a) const {
@@ -387,7 +390,8 @@ void applyGrad(Binary op, Parameters parameters, const float* a, const float* b,
       da = y / s;
       db = -x / s;
     }
-    for (int k = 0; k < 3; ++k) ga[k][i] = da * ga[k][i] + db * gb[k][i];
+    const auto part = [](float slope, float g) { return g == 0 ? 0 : slope * g; };
+    for (int k = 0; k < 3; ++k) ga[k][i] = part(da, ga[k][i]) + part(db, gb[k][i]);
     out[i] = scalarValue(op, parameters, x, y);
   }
 }

@@ -16,7 +16,8 @@ template <class F>
 Interval rising(const F& f, const Interval& a) {
   const double lo = f(double(a.min)), hi = f(double(a.max));
   if (!(lo <= hi)) return Interval::everything();
-  return {float(lo - std::abs(lo) * 1e-6 - 1e-44), float(hi + std::abs(hi) * 1e-6 + 1e-44)};
+  const auto slack = [](double x) { return std::isfinite(x) ? std::abs(x) * 1e-6 + 1e-44 : 0; };
+  return {float(lo - slack(lo)), float(hi + slack(hi))};
 }
 
 Interval sineRange(const Interval& a, double shift) {

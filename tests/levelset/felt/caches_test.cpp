@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -54,6 +55,22 @@ TEST(FeltCaches, GiveTheNearestValueOfTheBorderOutside) {
   const Vec3f g = values["g"].as<VectorField>()({7, 0.5f, 0.5f});
   EXPECT_FLOAT_EQ(g.x, 0);
   EXPECT_NEAR(g.y, 10, 1e-4);
+}
+
+TEST(FeltCaches, HaveTheirGradientsOnTheirFaces) {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<int> hundredths(-2000, 2000);
+  for (int i = 0; i < 30; ++i) {
+    const double x = hundredths(random) * 0.01, y = hundredths(random) * 0.01, z = hundredths(random) * 0.01;
+    auto values =
+        ran(fmt::format("domain d(({}, {}, {}), (1,1,1), 0.1);\n"
+                        "vectorfield g = grad(bake(identity() * (1,2,3), d));",
+                        x, y, z));
+    for (const Vec3d& corner : {Vec3d{0, 0, 0}, Vec3d{1, 1, 1}, Vec3d{0, 1, 0.5}})
+      EXPECT_NEAR(length(values["g"].as<VectorField>()(Vec3f(Vec3d{x, y, z} + corner)) - Vec3f(1, 2, 3)), 0,
+                  2e-3f)
+          << x << " " << y << " " << z;
+  }
 }
 
 TEST(FeltCaches, RangesHoldWhatIsInterpolated) {

@@ -108,7 +108,7 @@ const std::vector<Pair>& pairs() {
        "  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n"
        "  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n  called at s.felt:1:28\n"
        "  ... and 192 calls more"},
-      {Code::failed, "scalarfield s = shell(sphere((0,0,0), 1), -1);",
+      {Code::outOfRange, "scalarfield s = shell(sphere((0,0,0), 1), -1);",
        "s.felt:1:17: error: shell: thickness must be > 0 and finite, got -1\n"
        "  scalarfield s = shell(sphere((0,0,0), 1), -1);\n"
        "                  ^~~~~~~~~~~~~~~~~~~~~~~~~~~~~"},
@@ -127,8 +127,23 @@ TEST(FeltMessages, AreExactlyTheseForEveryCode) {
       EXPECT_TRUE(std::any_of(error.diagnostics().begin(), error.diagnostics().end(),
                               [&](const Diagnostic& fault) { return fault.code == pair.code; }))
           << pair.script;
-      EXPECT_EQ(error.isOfScript(), pair.code != Code::failed);
+      EXPECT_EQ(error.isOfScript(), pair.code != Code::importFailed);
     }
+  }
+  // Files and grids are not the script's fault.
+  Registry registry;
+  addModelingFunctions(registry);
+  registry.beginData();
+  registry.add("float readnumber(string path)", "Reads.", "float a = readnumber(\"a\");",
+               [](const std::string& path) -> double { throw Error(path + ": cannot be read"); });
+  try {
+    printedBy(Program("s.felt", "print(readnumber(\"a\"));", registry));
+    ADD_FAILURE() << "no fault";
+  } catch (const ScriptError& error) {
+    EXPECT_FALSE(error.isOfScript());
+    EXPECT_EQ(error.what(), std::string("s.felt:1:7: error: a: cannot be read\n  print(readnumber(\"a\"));\n"
+                                        "        ^~~~~~~~~~~~~~~"));
+    seen.insert(error.diagnostics()[0].code);
   }
   // The one that is a warning.
   const Program program("s.felt", "print(1/2);", allFunctions());

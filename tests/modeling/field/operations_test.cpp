@@ -299,6 +299,14 @@ TEST(FieldOps, CarriesNonFiniteValuesThrough) {
     EXPECT_EQ(grad(held)({-1, 0, 0}), Vec3f(0, 0, 0)) << "where the value is no longer that of the root";
 }
 
+TEST(FieldOps, RootsOfWhatStaysAtZeroHaveNoGradient) {
+  const ScalarField x = max(kX, 0), varying = max(kX, 0) + 0.5f;
+  for (const ScalarField& f : {sqrt(x), pow(x, 0.6f), pow(x, 1.5f), pow(x, varying)})
+    EXPECT_EQ(grad(f)({-1, 0, 0}), Vec3f(0, 0, 0));
+  EXPECT_FLOAT_EQ(grad(sqrt(x))({4, 0, 0}).x, 0.25f);
+  EXPECT_EQ(log(x).range(Box{{-2, 0, 0}, {-1, 1, 1}}), (Interval{-kInf, -kInf}));
+}
+
 TEST(FieldOps, RefusesArgumentsOutsideTheirRange) {
   EXPECT_THROW(clamp(kX, 2, 1), Error);
   EXPECT_THROW(clamp(kX, std::nanf(""), 1), Error);

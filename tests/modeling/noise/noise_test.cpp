@@ -174,11 +174,20 @@ TEST_P(MovingNoises, ChangeContinuouslyInTime) {
   EXPECT_GT(longer, 0.002);
 }
 
+/// Independent noises of unit rms differ by sqrt(2), opposite ones by 2. Feature points of cells stay in
+/// theirs.
+void expectIndependent(const NoiseOptions& a, const NoiseOptions& b) {
+  const bool isOfCells = a.kind == NoiseKind::worley || a.kind == NoiseKind::worleyDifference;
+  EXPECT_NEAR(difference(a, b).first, isOfCells ? 1.25 : std::sqrt(2.0), 0.25);
+}
+
 TEST_P(MovingNoises, AreOtherNoisesAfterAWhile) {
-  NoiseOptions a = optionsOf(GetParam(), true), b = a;
-  b.time = *a.time + 2;
-  // Independent noises of unit rms differ by sqrt(2).
-  EXPECT_GT(difference(a, b).first, 0.9);
+  for (const float later : {1.0f, 2.0f, 3.0f, 7.0f, 32.0f, 64.0f}) {
+    SCOPED_TRACE(later);
+    NoiseOptions a = optionsOf(GetParam(), true), b = a;
+    b.time = *a.time + later;
+    expectIndependent(a, b);
+  }
 }
 
 TEST_P(MovingNoises, AreStillAtTimeZero) {
@@ -195,6 +204,17 @@ TEST_P(MovingNoises, RepeatAfterTheirPeriod) {
   c.time = *a.time + 2.5f;
   EXPECT_LT(difference(a, b).second, 2e-4);
   EXPECT_GT(difference(a, c).first, 0.5);
+}
+
+TEST_P(MovingNoises, AreNotTheirOppositesAfterHalfAPeriod) {
+  for (const float period : {1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 8.0f}) {
+    SCOPED_TRACE(period);
+    NoiseOptions a = optionsOf(GetParam(), true);
+    a.period = period;
+    NoiseOptions b = a;
+    b.time = *a.time + period / 2;
+    expectIndependent(a, b);
+  }
 }
 
 TEST(LatticeNoise, LanesEqualTheScalarTruthBitForBit) {
