@@ -90,9 +90,11 @@ class Repl {
     bool isGood = true;
     while (!hasQuit_) {
       std::optional<std::string> text = reader.next(kPrompt);
+      line_ = ++lines_;
       while (text && !text->starts_with(':') && Outline(*text).open > 0) {
         const std::optional<std::string> more = reader.next(kMorePrompt);
         if (!more) break;
+        ++lines_;
         *text += '\n' + *more;
       }
       run_.check();
@@ -121,13 +123,15 @@ class Repl {
     return false;
   }
 
+  Named entered(const std::string& text) { return session_.enter(text, fmt::format("line {}", line_)); }
+
   void carryOut(const std::string& text) {
     const Outline outline(text);
     const auto firstWord = text.substr(0, text.find_first_of(" ([;"));
     // "float(3)" is a value, "float a" declares.
     const bool declares = felt::kindOf(firstWord) && text.find_first_of("([;") != firstWord.size();
     const bool isWhole = outline.last == ';' || outline.last == '}';
-    const Named answer = session_.enter(!isWhole && (outline.isAssignment || declares) ? text + ";" : text);
+    const Named answer = entered(!isWhole && (outline.isAssignment || declares) ? text + ";" : text);
     for (const std::string& warning : session_.warnings()) std::fprintf(stderr, "%s\n", warning.c_str());
     if (answer.type.kind != Kind::nothing) tell("", answer);
   }
@@ -161,7 +165,7 @@ class Repl {
   /// The value of a variable; nothing if it has none.
   Named valueOf(const std::string& name) {
     try {
-      return session_.enter(name);
+      return entered(name);
     } catch (const felt::ScriptError&) {
       return {};
     }
@@ -169,7 +173,7 @@ class Repl {
 
   ScalarField fieldOf(const std::string& text) {
     if (text.empty()) throw Error("say which field");
-    const Named named = session_.enter(text);
+    const Named named = entered(text);
     const felt::Type wanted{Kind::scalarField};
     if (named.type != wanted && !conversionCost(named.type, wanted))
       throw Error(fmt::format("{} is {}; what can be drawn is a scalarfield, such as .x of a vectorfield",
@@ -178,7 +182,7 @@ class Repl {
   }
 
   Vec3f vectorOf(const std::string& text) {
-    const Named named = session_.enter(text);
+    const Named named = entered(text);
     if (named.type != felt::Type{Kind::vector})
       throw Error(quoted(text, 60) + " is no vector such as (1, 0, 0)");
     return felt::toFloat(named.value.as<Vec3d>());
@@ -205,8 +209,10 @@ class Repl {
     std::optional<std::pair<Vec3f, Vec3f>> ends;
     // What stands behind the field comes in any order.
     while (true) {
-      const std::size_t space = text.rfind(' ');
-      const std::string word = space == std::string::npos ? "" : text.substr(space + 1);
+      const bool isQuoted = text.size() > 1 && text.ends_with('"');
+      const std::size_t space = isQuoted ? text.rfind('"', text.size() - 2) : text.rfind(' ');
+      std::string word = space == std::string::npos ? "" : text.substr(space + 1);
+      if (isQuoted && !word.empty()) word.pop_back();
       const bool isPlane = word.size() > 2 && word[0] >= 'x' && word[0] <= 'z' && word[1] == '=';
       if (word.ends_with(".png"))
         picture = word;
@@ -248,6 +254,8 @@ class Repl {
   Run& run_;
   felt::Context context_;
   felt::Session session_;
+  /// Lines that were read, and the first of those that are being answered.
+  int lines_ = 0, line_ = 0;
   bool hasQuit_ = false;
 };
 

@@ -206,7 +206,15 @@ CumuloLayer layerOf(const LayerRecipe& recipe, int index, const CumuloFractal& f
     throw recipe.spectrumPlace->fault(
         felt::Code::outOfRange,
         fmt::format("only noise = \"fft\" has a spectrum, not \"{}\"", noiseName(own.noise.kind)));
-  return cumuloLayer(own);
+  try {
+    return cumuloLayer(own);
+  } catch (const Error& error) {
+    const auto place = recipe.spectrum    ? recipe.spectrumPlace
+                       : recipe.frequency ? recipe.frequency->place
+                                          : nullptr;
+    if (!place) throw;
+    throw place->fault(felt::Code::outOfRange, error.what());
+  }
 }
 
 void apply(const LayerRecipe& recipe, int index, const CumuloFractal& fractal, FieldSources& sources,

@@ -197,6 +197,9 @@ TEST_F(FeltVerb, GoesOnAfterAFaultInALine) {
   EXPECT_EQ(result.output, "2 : int\n");
   EXPECT_TRUE(contains(result.errors, "line 1:1:1: error: there is no function 'spere'")) << result.errors;
   EXPECT_TRUE(contains(result.errors, "there is no command ':dance'")) << result.errors;
+  // Lines are those that were read, whatever the prompt had to look up between them.
+  const ProgramResult later = piped("felt repl", "float a = 1\n:names\n[1,\n 2]\nspere(a)\n");
+  EXPECT_TRUE(contains(later.errors, "line 5:1:1: error")) << later.errors;
   EXPECT_TRUE(contains(result.errors, ":plot FIELD from (x, y, z) to (x, y, z)")) << result.errors;
 }
 
@@ -221,6 +224,32 @@ TEST_F(FeltVerb, SlicesAFieldAsTextAndAsAPicture) {
   // The box is as wide in z as it is high in y.
   const ProgramResult info = runProgram("info " + picture);
   EXPECT_TRUE(contains(info.output, "512")) << info.output << info.errors;
+}
+
+TEST_F(FeltVerb, PicturesMayHaveBlanksInTheirNames) {
+  const std::string picture = folder_.file("a slice.png");
+  const ProgramResult result =
+      piped("felt repl", ":slice P.x - P.y z=0 \"" + picture + "\" from (-1, -1, -1) to (1, 1, 1)\n");
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_EQ(runProgram("info '" + picture + "'").exitCode, 0);
+}
+
+TEST_F(FeltVerb, TellsFaultsOfScriptsFromThoseOfFiles) {
+  const struct {
+    const char* script;
+    int exitCode;
+  } cases[] = {{"scalarfield f = sphere((0,0,0), -1);", 2},
+               {"scalarfield f = noise(\"foo\");", 2},
+               {"scalarfield f = smoothstep(1, 0, P.x);", 2},
+               {"domain d((0,0,0), (1,1,1), 0);", 2},
+               {"import \"nowhere.felt\";", 1},
+               {"scalarfield f = readfield(\"no.vdb\");", 1},
+               {"scalarfield f = mask(P.x, 0);", 2}};
+  for (const auto& c : cases) {
+    const std::string path = folder_.file("fault.felt");
+    std::ofstream(path) << c.script << "\n";
+    EXPECT_EQ(runProgram("felt run " + path).exitCode, c.exitCode) << c.script;
+  }
 }
 
 TEST_F(FeltVerb, RunsTheFiguresOfTheNotes) {
