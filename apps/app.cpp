@@ -55,8 +55,7 @@ int usageError(const std::string& who, const std::string& what) {
 
 int runWork(const std::string& who, ProgramRun& run, const CommonOptions& options,
             const std::function<void()>& work) {
-  const auto finish = [&] {
-    run.finish();
+  const auto tellStatistics = [&] {
     if (!options.stats.empty()) writeStatistics(options.stats, run.statistics());
   };
   try {
@@ -64,33 +63,32 @@ int runWork(const std::string& who, ProgramRun& run, const CommonOptions& option
       work();
     } catch (const SeveralErrors&) {
       // They are of some of the files; what is in the others is known.
-      finish();
+      run.endStages();
+      tellStatistics();
+      throw;
+    } catch (...) {
+      run.endStages();
       throw;
     }
-    finish();
+    run.finish();
+    tellStatistics();
     require(std::cout.flush().good() && std::fflush(stdout) == 0, "the standard output could not be written");
     return 0;
   } catch (const Cancelled&) {
-    run.finish();
     std::cerr << who << ": stopped; no partial output was left\n";
     return stopSignal() != 0 ? 128 + stopSignal() : kFailed;
   } catch (const CLI::Error& error) {
-    run.finish();
     return usageError(who, error.what());
   } catch (const std::bad_alloc&) {
-    run.finish();
     std::cerr << who << ": error: out of memory; lower --memory-limit or the resolution\n";
   } catch (const AlreadyTold& told) {
-    run.finish();
     return told.exitCode;
   } catch (const felt::ScriptError& error) {
-    run.finish();
     std::cerr << error.what() << '\n';
     return error.isOfScript() ? kUsage : kFailed;
   } catch (const SeveralErrors& errors) {
     for (const std::string& message : errors.messages()) printError(who, message);
   } catch (const std::exception& error) {
-    run.finish();
     printError(who, error.what());
   }
   return kFailed;
@@ -176,8 +174,18 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
     line.arguments = withSettings(std::move(typed));
     return line;
   }
+  // A wedge that a file sets is one that was typed.
+  const auto isWedge = [](const std::string& argument) { return argument.starts_with("--wedge="); };
+  std::vector<std::string> withFile = withSettings(typed);
+  std::copy_if(withFile.begin() + std::ptrdiff_t(typed.size()), withFile.end(), std::back_inserter(typed),
+               isWedge);
   line.wedge = Wedge::taken(typed, command.app);
-  line.arguments = withSettings(typed);
+  const auto settled = [=](std::vector<std::string> own) {
+    own = withSettings(std::move(own));
+    std::erase_if(own, isWedge);
+    return own;
+  };
+  line.arguments = settled(typed);
   const bool hasSheet = givenTo("--contact-sheet", line.arguments).has_value();
   const auto withSheet = [=, &command](std::vector<std::string> arguments) {
     return hasSheet ? withPreview(std::move(arguments), command.app) : arguments;
@@ -185,7 +193,7 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
   const auto ofValue = [=, &command, wedge = line.wedge](std::size_t i) {
     std::vector<std::string> own = wedge->arguments(i);
     own.insert(own.begin(), typed.begin(), typed.end());
-    return wedge->named(withSheet(withSettings(std::move(own))), i, command.app);
+    return wedge->named(withSheet(settled(std::move(own))), i, command.app);
   };
   if (givenTo("--frames", line.arguments)) {
     if (!line.wedge) line.sequences.push_back(*Sequence::of(withSheet(line.arguments)));
@@ -202,23 +210,38 @@ Line lineOf(const Command& command, std::vector<std::string> typed, const WithSe
   return line;
 }
 
-/// Looks before the work whether it can be done, with the options of the first call, and of the first of
-/// every sequence.
-void check(Command& command, Line& line, const Run& run) {
-  requireDistinctOutputs(command.app);
-  if (!line.isSequence() && !command.verb.passesOthersOn) refuseFrameNames(command.app);
-  std::set<std::string> known;
+void checkCalls(const Command& command, Line& line, const Run& run) {
+  std::set<std::string> outputs, inputs;
   const std::size_t frames = line.isSequence() ? line.sequences.front().size() : 1;
-  for (std::size_t i = 0; line.isSeveral() && i < line.calls.count; i += frames) {
+  for (std::size_t i = 0; i < line.calls.count; i += frames) {
+    run.check();
     Command own(command.verb);
     own.parse(line.calls.at(i).arguments);
-    if (!line.isSequence()) continue;
-    const Sequence& sequence = line.sequences[i / frames];
-    sequence.check(own.app, known, run);
-    line.calls.variesInputs = line.calls.variesInputs || sequence.variesInputs(own.app);
+    requireDistinctOutputs(own.app, outputs);
+    if (!command.options.contactSheet.empty()) requireSeen(own.app, command.app);
+    if (line.isSequence()) {
+      const Sequence& sequence = line.sequences[i / frames];
+      sequence.check(own.app, inputs, run);
+      // Calls of other frames take too long to be read.
+      for (const auto& [option, path] : sequence.outputs(own.app))
+        for (std::size_t frame = 1; frame < frames; ++frame) requireOwnFile(option, path(frame), outputs);
+      line.calls.variesInputs = line.calls.variesInputs || sequence.variesInputs(own.app);
+    }
+    tryOutputs(own.app);
   }
-  tryOutputs(command.app);
-  if (line.isSeveral() && !command.options.contactSheet.empty()) requireSeen(command.app);
+}
+
+/// Looks before the work whether it can be done, with the options of all calls; whether files are there and
+/// can be written, with those of the first of every sequence, or of every value.
+void check(Command& command, Line& line, const Run& run) {
+  if (!line.isSequence() && !command.verb.passesOthersOn) refuseFrameNames(command.app);
+  if (line.isSeveral()) {
+    checkCalls(command, line, run);
+  } else {
+    std::set<std::string> outputs;
+    requireDistinctOutputs(command.app, outputs);
+    tryOutputs(command.app);
+  }
   for (const char* option : {"--only", "--shard", "--skip-existing", "--contact-sheet"}) {
     const bool isOfFrames = option == std::string_view("--only") || option == std::string_view("--shard");
     if (!command.hasOwnFrames() && given(command.app, option) &&
@@ -280,7 +303,8 @@ Line parsedLine(Command& command, const std::vector<Verb>& verbs, std::vector<st
   refuseBytesOfZero(arguments);
   const std::string& name = command.verb.name;
   const std::vector<std::string> names = namesOf(verbs);
-  const auto withSettings = [&](std::vector<std::string> typed) {
+  // Calls of a line are made of it when this function is over.
+  const auto withSettings = [&command, &name, names](std::vector<std::string> typed) {
     if (command.verb.passesOthersOn) return typed;
     return withConfigFile({command.app, name, names}, std::move(typed));
   };

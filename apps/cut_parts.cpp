@@ -57,8 +57,8 @@ void addLevelSets(std::vector<CutPart>& parts, double voxelSize, Run& run) {
     if (!part.level) part.mesh = triangulated(part.mesh);
     run.requireMemory(2 * estimateLevelSetBytes(part.mesh, options),
                       "use larger voxels (a lower --resolution or a larger --voxel-size)");
-    if (!part.level)
-      part.level = namingFile(part.name, [&] { return toBricks(meshToLevelSet(part.mesh, options, run)); });
+    const auto made = [&] { return toBricks(meshToLevelSet(part.mesh, options, run)); };
+    if (!part.level) part.level = parts.size() > 1 ? namingFile(part.name, made) : made();
   }
 }
 
@@ -76,7 +76,8 @@ std::vector<CutPart> CutArguments::readParts(Run& run) const {
   std::vector<CutPart> parts = readInput(*this, run);
   const bool isListed = fs::exists(fs::path(input) / "pieces.json");
   // What a cut has made is whole, and may hold places that are equal and must not be merged.
-  if (!isListed && !isVolumeFile(input)) {
+  const bool isWrapped = repair.mode == MeshRepairOptions::Mode::wrap;
+  if ((!isListed || isWrapped) && !isVolumeFile(input)) {
     run.begin("repair");
     MeshRepairOptions options = repair;
     options.keepPolygons = geometry == Geometry::exact;
@@ -93,6 +94,19 @@ std::vector<CutPart> CutArguments::readParts(Run& run) const {
   constexpr double kBytesPerTriangle = 1500;
   run.requireMemory(kBytesPerTriangle * double(triangles), "cut a coarser mesh");
   return parts;
+}
+
+void CutArguments::requireInputsKept() const {
+  std::vector<std::string> files = knifeFiles;
+  files.push_back(input);
+  std::error_code error;
+  for (const std::string& file : files)
+    if (!folder.empty() && fs::equivalent(fs::absolute(file).parent_path(), folder, error) &&
+        isListedPiece(file))
+      throw Error(
+          fmt::format("{}: is one of the pieces in {}, which all make room for the new ones: give the folder "
+                      "to cut all of them, or write to another",
+                      file, folder));
 }
 
 bool CutArguments::isModel() const {

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace nephele::apps {
 
@@ -28,15 +29,24 @@ class ContentHash {
 /// Size and time of the last change of a file; "" where there is none.
 std::string fileStamp(const std::string& path);
 
+/// What may be the name of a file in `text`: all of it, what stands within quotes, and what begins behind an
+/// equals sign or a colon, or ends before a colon; longer ones come first. What a script writes is not there.
+std::vector<std::string> namesIn(std::string_view text);
+
 /// Hashes of what files hold, each read once while its stamp stays the same.
 class FileHashes {
  public:
-  const std::string& of(const std::string& path);
+  /// Scripts (.felt), recipes (.toml) and .gltf count with the files that they name, seen from here or from
+  /// their own folder.
+  std::string of(const std::string& path);
 
  private:
   struct Known {
     std::string stamp, hash;
+    std::vector<std::string> names;
   };
+  const Known& knownOf(const std::string& path);
+
   std::map<std::string, Known> known_;
 };
 

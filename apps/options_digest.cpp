@@ -4,10 +4,15 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "apps/app.h"
+#include "apps/options/picture/view_options.h"
+#include "nephele/levelset/cut/piece_files.h"
 #include "nephele/levelset/io/mesh_io.h"
+#include "nephele/levelset/io/obj_text.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/image/image_file.h"
@@ -20,6 +25,12 @@ constexpr std::string_view kHow[]{"config",       "look",           "skip-existi
                                   "memory-limit", "display-server", "quiet",         "verbose",
                                   "progress",     "overwrite",      "help"};
 
+std::string extensionOf(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return extension;
+}
+
 std::string digestOfPicture(const std::string& path) {
   std::string digest;
   const detail::ImageReader reader{[&](const detail::ImageHeader& header) {
@@ -28,15 +39,41 @@ std::string digestOfPicture(const std::string& path) {
                                    },
                                    [](int, const float*) {},
                                    [](std::span<const unsigned>, std::span<const std::vector<float>>) {}};
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  extension == ".png" ? detail::readPngFile(path, reader) : detail::readExrFile(path, reader);
+  extensionOf(path) == ".png" ? detail::readPngFile(path, reader) : detail::readExrFile(path, reader);
   return digest;
 }
 
 std::string digestOfVolume(const std::string& path) {
   const std::vector<VdbGrid> grids = readVdbFile(path);
   return grids.empty() ? "" : metadataOf(grids.front(), kPartDigest).value_or("");
+}
+
+std::string textOf(const CLI::App& app, const std::string& option) {
+  return app.count(option) > 0 ? app.get_option(option)->results().front() : "";
+}
+
+/// That its list of pieces has.
+std::string digestOfPieces(const std::string& folder) {
+  static_cast<void>(readPieces(folder));
+  std::ifstream list(std::filesystem::path(folder) / "pieces.json");
+  const nlohmann::json found = nlohmann::json::parse(list, nullptr, false);
+  require(found.is_object(), folder + ": has no list of pieces");
+  for (const nlohmann::json& file : found.value("files", nlohmann::json::array()))
+    require(
+        file.is_string() && std::filesystem::exists(std::filesystem::path(folder) / file.get<std::string>()),
+        fmt::format("{}: has no {}", folder, file.dump()));
+  return found.value(kPartDigest, "");
+}
+
+/// What ends early between two lines can be read, too.
+void requireWholeMesh(const std::string& path) {
+  static_cast<void>(readMesh(path));
+  if (extensionOf(path) != ".obj") return;
+  std::ifstream file(path, std::ios::binary);
+  std::string end(detail::kObjEnd.size(), ' ');
+  file.seekg(-std::streamoff(end.size()), std::ios::end);
+  file.read(end.data(), std::streamsize(end.size()));
+  require(end == detail::kObjEnd, path + ": has no last line");
 }
 
 }  // namespace
@@ -59,17 +96,21 @@ std::string optionsDigest(const CLI::App& app, std::span<const std::string_view>
       const std::string rest = equals == std::string::npos ? value : value.substr(equals + 1);
       const bool isFile = std::filesystem::is_regular_file(rest, ignored);
       hash.add(isFile ? value.substr(0, value.size() - rest.size()) : value);
-      if (isFile) hash.add(files.of(rest));
+      for (const std::string& file : isFile ? std::vector{rest} : namesIn(value))
+        if (std::filesystem::is_regular_file(file, ignored)) hash.add(files.of(file));
     }
   }
+  if (app.get_option_no_throw("--ocio-config") && std::ranges::count(others, "view-transform") == 0)
+    hash.add(ViewOptions{.name = textOf(app, "--view-transform"), .config = textOf(app, "--ocio-config")}
+                 .identity());
   return hash.text();
 }
 
 std::string outputDigest(const std::string& path) {
-  require(!std::filesystem::is_directory(path), path + ": is a folder");
+  if (std::filesystem::is_directory(path)) return digestOfPieces(path);
   if (isVolumeFile(path)) return digestOfVolume(path);
   if (!isMeshFile(path)) return digestOfPicture(path);
-  static_cast<void>(readMesh(path));
+  requireWholeMesh(path);
   return "";
 }
 

@@ -10,8 +10,9 @@
 namespace nephele::apps {
 
 /// Says what a call makes: a hash of the options of `app` that were given, the contents of the files that
-/// they name, the version of the program, and `more`. Outputs, and options of how the program runs, do not
-/// count, nor do those named `others`. The same wherever input files are.
+/// they and these name, the view of an OpenColorIO configuration, the version of the program, and `more`.
+/// Outputs, and options of how the program runs, do not count, nor do those named `others`. The same wherever
+/// files are that are all of a value, or all behind its equals sign.
 std::string optionsDigest(const CLI::App& app, std::span<const std::string_view> others,
                           const std::string& more, FileHashes& files);
 

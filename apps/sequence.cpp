@@ -6,6 +6,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "apps/file_hashes.h"
 #include "apps/options/config_file.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/levelset/io/vdb_io.h"
@@ -165,14 +166,20 @@ const Sequence::Word* Sequence::wordOf(const std::string& value) const {
 std::vector<Sequence::File> Sequence::inputs(const CLI::App& first) const {
   std::vector<File> result;
   for (const CLI::Option* option : first.get_options()) {
-    if (!namesFile(*option) || isOutput(*option)) continue;
+    if (isOutput(*option)) continue;
     for (const std::string& value : option->results()) {
       const Word* word = wordOf(value);
       if (!word) continue;
-      // NAME=FILE
-      const std::size_t equals = fs::exists(value) ? std::string::npos : value.rfind('=');
-      const std::size_t length = value.size() - (equals == std::string::npos ? 0 : equals + 1);
-      result.push_back({word, word->pattern.path(range_.frames().front()).size() - length});
+      const std::string text = word->pattern.path(range_.frames().front());
+      std::optional<File> file;
+      for (const std::string& name : namesIn(value)) {
+        const std::size_t before = text.size() - value.size() + value.find(name);
+        const File one{word, before, text.size() - before - name.size()};
+        if (FramePattern::places(one.name()) == 0) continue;
+        // All of the value comes first; of names of which there is no file the last is the shortest.
+        if (!file || !fs::exists(file->path(range_.frames().front()))) file = one;
+      }
+      if (file) result.push_back(*file);
     }
   }
   return result;
@@ -180,10 +187,27 @@ std::vector<Sequence::File> Sequence::inputs(const CLI::App& first) const {
 
 void Sequence::requireNumberedOutputs(const CLI::App& first) const {
   for (const CLI::Option* option : first.get_options()) {
-    if (!isOutput(*option) || option->check_lname("stats") || option->check_lname("contact-sheet")) continue;
+    if (!isOutputOfCall(*option)) continue;
     for (const std::string& value : option->results())
       if (!isStream(value) && !wordOf(value)) refuseValue(option->get_name(false, true), value, kForm);
   }
+}
+
+std::vector<std::pair<std::string, std::function<std::string(std::size_t)>>> Sequence::outputs(
+    const CLI::App& first) const {
+  std::vector<std::pair<std::string, std::function<std::string(std::size_t)>>> result;
+  for (const CLI::Option* option : first.get_options()) {
+    if (!isOutputOfCall(*option)) continue;
+    for (const std::string& value : option->results())
+      if (const Word* word = wordOf(value)) {
+        const bool isNamed = option->get_type_name().starts_with("[NAME=]");
+        const std::size_t length = value.size() - (isNamed ? value.find('=') + 1 : 0);
+        const File file{word, word->pattern.path(range_.frames().front()).size() - length, 0};
+        result.emplace_back(option->get_name(false, true),
+                            [this, file](std::size_t i) { return file.path(range_.frames()[i]); });
+      }
+  }
+  return result;
 }
 
 void Sequence::check(const CLI::App& first, std::set<std::string>& known, const Run& run) const {
@@ -195,16 +219,12 @@ void Sequence::check(const CLI::App& first, std::set<std::string>& known, const 
   for (const File& file : files)
     requireSameGrids(
         range_.frames(), [&](int frame) { return file.path(frame); }, run);
-  for (const CLI::Option* option : first.get_options())
-    for (const std::string& value : option->results())
-      if (isOutput(*option) && wordOf(value)) {
-        const bool isNamed = option->get_type_name().starts_with("[NAME=]");
-        const fs::path folder = fs::path(isNamed ? value.substr(value.find('=') + 1) : value).parent_path();
-        std::error_code error;
-        if (!folder.empty()) fs::create_directories(folder, error);
-        require(!error,
-                fmt::format("cannot write {}: the folder cannot be made: {}", value, error.message()));
-      }
+  for (const std::string& path : outputsOf(first)) {
+    const fs::path folder = fs::path(path).parent_path();
+    std::error_code error;
+    if (!folder.empty()) fs::create_directories(folder, error);
+    require(!error, fmt::format("cannot write {}: the folder cannot be made: {}", path, error.message()));
+  }
 }
 
 void refuseFrameNames(const CLI::App& app) {

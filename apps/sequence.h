@@ -58,6 +58,10 @@ class Sequence {
   /// @throws CLI::ValidationError naming the option, Error naming the frames that are missing, or the file.
   void check(const CLI::App& first, std::set<std::string>& known, const Run& run) const;
 
+  /// Options of outputs, `first` being those of the first call, and the file of each by the index of a frame.
+  std::vector<std::pair<std::string, std::function<std::string(std::size_t)>>> outputs(
+      const CLI::App& first) const;
+
   /// Whether an input differs from frame to frame.
   bool variesInputs(const CLI::App& first) const { return !inputs(first).empty(); }
 
@@ -67,12 +71,15 @@ class Sequence {
     std::size_t index;
     FramePattern pattern;
   };
-  /// A file of every frame: the argument, and where in it the name of the file begins.
+  /// A file of every frame: the argument, and how much of it stands before and behind the name of the file.
   struct File {
     const Word* word;
-    std::size_t start;
-    std::string path(int frame) const { return word->pattern.path(frame).substr(start); }
-    std::string name() const { return word->pattern.text().substr(start); }
+    std::size_t before, behind;
+    std::string path(int frame) const { return nameIn(word->pattern.path(frame)); }
+    std::string name() const { return nameIn(word->pattern.text()); }
+    std::string nameIn(const std::string& text) const {
+      return before + behind < text.size() ? text.substr(before, text.size() - before - behind) : "";
+    }
   };
 
   explicit Sequence(std::vector<std::string> arguments);

@@ -19,9 +19,10 @@ namespace {
 
 constexpr const char* kWedgeForm =
     "OPTION=VALUES, as in seed=1-12, billow=0,0.5,1,2 or sun=90,38;120,10 (several options: once more)";
-constexpr std::string_view kNever[]{"frames",        "only",   "shard", "skip-existing", "wedge",
-                                    "contact-sheet", "stats",  "quiet", "verbose",       "progress",
-                                    "overwrite",     "config", "help",  "help-all"};
+constexpr std::string_view kNever[]{"frames",        "only",        "shard",   "skip-existing",  "wedge",
+                                    "contact-sheet", "stats",       "quiet",   "verbose",        "progress",
+                                    "overwrite",     "config",      "threads", "display-server", "help",
+                                    "help-all",      "memory-limit"};
 
 void refuseCount(double count) {
   if (count <= double(Wedge::kMost)) return;
@@ -86,10 +87,6 @@ bool isOption(const std::string& argument, const CLI::App& app, bool (*fits)(con
   const bool isName = argument.starts_with("--") || (argument.size() == 2 && argument[0] == '-');
   const CLI::Option* option = isName ? app.get_option_no_throw(argument) : nullptr;
   return option && fits(*option);
-}
-
-bool isNamedByWedge(const CLI::Option& option) {
-  return isOutput(option) && !option.check_lname("stats") && !option.check_lname("contact-sheet");
 }
 
 }  // namespace
@@ -174,10 +171,8 @@ std::vector<std::string> Wedge::arguments(std::size_t index) const {
   std::vector<std::string> result;
   for (std::size_t axis = 0; axis != axes_.size(); ++axis) {
     const std::string& value = valueOf(axis, index);
-    if (!axes_[axis].isFlag)
-      result.push_back(fmt::format("--{}={}", axes_[axis].option, value));
-    else if (value == "true")
-      result.push_back("--" + axes_[axis].option);
+    const bool isOn = axes_[axis].isFlag && value == "true";
+    result.push_back("--" + axes_[axis].option + (isOn ? "" : "=" + value));
   }
   return result;
 }
@@ -191,7 +186,9 @@ std::string Wedge::label(std::size_t index) const {
 
 std::string Wedge::fileName(const std::string& path, std::size_t index, bool isSequence) const {
   if (isStream(path)) return path;
-  const bool hasPlace = FramePattern::places(path) == 1;
+  const int places = FramePattern::places(path);
+  if (places > 1) refuseValue("--wedge", path, "outputs with one place for a number, as in NAME.####.EXT");
+  const bool hasPlace = places == 1;
   if (hasPlace && !isSequence) return FramePattern::parse(path).path(int(index) + 1);
   std::string values;
   for (std::size_t axis = 0; axis != axes_.size(); ++axis) {
@@ -206,12 +203,15 @@ std::string Wedge::fileName(const std::string& path, std::size_t index, bool isS
     values += fmt::format("{}{}_{}", values.empty() ? "" : ".", axes_[axis].option, name);
   }
   if (hasPlace) return FramePattern::parse(path).withWords(values);
-  const std::filesystem::path file(path);
+  std::filesystem::path file(path);
+  if (!file.has_filename()) file = file.parent_path();
   return (file.parent_path() / (file.stem().string() + "." + values + file.extension().string())).string();
 }
 
 std::vector<std::string> Wedge::named(std::vector<std::string> arguments, std::size_t index,
                                       const CLI::App& app) const {
+  for (const Axis& axis : axes_)
+    if (axis.isFlag) std::erase(arguments, "--" + axis.option + "=false");
   const bool isSequence = givenTo("--frames", arguments).has_value();
   const auto own = [&](const std::string& path) { return fileName(path, index, isSequence); };
   for (std::size_t i = 0; i < arguments.size(); ++i) {
@@ -219,9 +219,9 @@ std::vector<std::string> Wedge::named(std::vector<std::string> arguments, std::s
     const std::size_t equals = argument.find('=');
     if (argument.starts_with("-o") && argument.size() > 2)
       argument = "-o" + own(argument.substr(2));
-    else if (equals != std::string::npos && isOption(argument.substr(0, equals), app, isNamedByWedge))
+    else if (equals != std::string::npos && isOption(argument.substr(0, equals), app, isOutputOfCall))
       argument = argument.substr(0, equals + 1) + own(argument.substr(equals + 1));
-    else if (isOption(argument, app, isNamedByWedge) && i + 1 < arguments.size()) {
+    else if (isOption(argument, app, isOutputOfCall) && i + 1 < arguments.size()) {
       arguments[i + 1] = own(arguments[i + 1]);
       ++i;
     }

@@ -26,7 +26,8 @@ class Wedge {
   void requireFew(std::size_t frames) const;
   /// Columns of a table of all calls, row by row; nothing for one option.
   std::optional<int> columns() const;
-  /// What call `index` has in addition to the others.
+  /// What call `index` has in addition to the others. A flag that is off is there, as --flag=false, so that
+  /// no file and no look sets it, until `named` takes it off.
   std::vector<std::string> arguments(std::size_t index) const;
   /// Options and their values: {"billow": "0.5"}
   std::map<std::string, std::string> values(std::size_t index) const;

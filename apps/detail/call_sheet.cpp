@@ -97,8 +97,13 @@ std::vector<std::string> withPreview(std::vector<std::string> arguments, const C
   return arguments;
 }
 
-void requireSeen(const CLI::App& first) {
-  const CLI::Option *preview = first.get_option_no_throw("--preview"), *output = first.get_option("--output");
+void requireSeen(const CLI::App& call, const CLI::App& first) {
+  for (const char* name : {"--size", "--crop"})
+    if (const CLI::Option* option = call.get_option_no_throw(name))
+      if (option->results() != first.get_option(name)->results())
+        throw CLI::ValidationError("--contact-sheet",
+                                   fmt::format("shows pictures of one size; {} varies it", name));
+  const CLI::Option *preview = call.get_option_no_throw("--preview"), *output = call.get_option("--output");
   if (preview && preview->count() > 0) return;
   if (output->count() == 0 || !isSeen(output->results().front()))
     throw CLI::ValidationError("--contact-sheet", "shows previews, volumes and meshes; give --output");

@@ -42,12 +42,9 @@ void addSeveralCalls(CLI::App& app, CommonOptions& options) {
   app.add_flag("--skip-existing", options.skipExisting,
                "Keep the outputs of calls that are there, whole and made with the same options.")
       ->group(kSeveralGroup);
-  markOutput(
-      app.add_option(
-          "--contact-sheet", options.contactSheet,
-          "All frames, or all values of --wedge (with --frames the middle frame of each), small on one "
-          "picture (.png), each with its name."))
-      ->type_name("FILE")
+  addOutput(app, "--contact-sheet", options.contactSheet, {".png"},
+            "All frames, or all values of --wedge (with --frames the middle frame of each), small on one "
+            "picture (.png), each with its name.")
       ->group(kSeveralGroup);
 }
 

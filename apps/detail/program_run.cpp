@@ -234,9 +234,13 @@ void ProgramRun::result(const std::string& line) const {
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
-void ProgramRun::finish() const {
+void ProgramRun::endStages() const {
   const std::lock_guard lock(mutex_);
   endStage();
+}
+
+void ProgramRun::finish() const {
+  endStages();
   if (options_.progress == "alf") {
     fmt::print("ALF_PROGRESS 100%\n");
     std::fflush(stdout);

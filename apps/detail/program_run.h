@@ -51,6 +51,8 @@ class ProgramRun : public Run {
   bool tellsResults = true;
 
   /// Ends the last stage and clears the bar. Call before anything else is printed.
+  void endStages() const;
+  /// The same where all is done, which farm software is told.
   void finish() const;
 
   /// The whole statistics object, with what the program itself knows filled in.

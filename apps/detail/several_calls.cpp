@@ -44,15 +44,6 @@ nlohmann::json described(const Extent& range) {
   return {{"box", {corner(range.box.min), corner(range.box.max)}}, {"longest_side", range.longestSide}};
 }
 
-/// What the call makes, but for streams.
-std::vector<std::string> outputsOf(const CLI::App& app) {
-  std::vector<std::string> files;
-  for (const CLI::Option* option : app.get_options())
-    if (isOutput(*option) && !option->check_lname("stats") && !option->check_lname("contact-sheet"))
-      for (const std::string& value : option->results()) files.push_back(value);
-  return files;
-}
-
 std::string valueOf(const CLI::App& app, const std::string& name) {
   const CLI::Option* option = app.get_option_no_throw(name);
   return option && option->count() > 0 ? option->results().front() : "";

@@ -176,9 +176,8 @@ void TurntablePlan::setDigests(Run& run) {
   const std::string ofFrames = digestWithout(others, run);
   for (TurntableFrame& frame : frames) {
     const auto digestOf = [&](const std::string& all) {
-      if (!changes && !hidesAnew) return all;
       ContentHash hash;
-      hash.add(all);
+      hash.add(fmt::format("{} {}", all, frame.number));
       hash.add(frame.volumeKey);
       if (hidesAnew) hash.add(run.files.of(frame.holdout));
       return hash.text();

@@ -41,7 +41,8 @@ struct TurntableFrame {
   /// Frames of equal ones show the same volume.
   std::string volumeKey{};
   /// Says what the frame is made of: the options that its pixels depend on, as typed, the contents of the
-  /// files that these name, first and last frame, and the version of the program. The attribute kPartDigest.
+  /// files that these name, its number, first and last frame, and the version of the program. The attribute
+  /// kPartDigest.
   std::string digest{};
   /// The same of its preview, with how that is shown.
   std::string previewDigest{};

@@ -56,11 +56,8 @@ std::filesystem::path folderOfLooks() {
 std::vector<std::string> LookExports::volumeLine(const std::string& output) const {
   const std::string verb = what == LookShow::What::wisps ? "wisps" : "cloud";
   std::vector<std::string> line{verb};
-  LookSettings::value_type own = settings[verb];
-  if (!subject.path.empty())
-    line.push_back(subject.path);
-  else if (verb == "cloud" && !own.contains("species"))
-    own["species"] = "mediocris";
+  const LookSettings own = verb == "cloud" ? subject.cloudSettings(settings) : settings[verb];
+  if (!subject.path.empty()) line.push_back(subject.path);
   line.push_back("-o");
   line.push_back(output);
   for (std::string& argument : argumentsOf(own)) line.push_back(std::move(argument));
@@ -119,8 +116,10 @@ std::vector<std::string> LookExports::typed() const {
 
 std::string LookExports::recipe() const {
   std::string text;
-  if (subject.hasCloud())
-    for (const char* verb : {"cloud", "wisps", "cut", "transfer"}) addTable(text, verb, settings[verb]);
+  if (subject.hasCloud()) {
+    addTable(text, "cloud", subject.cloudSettings(settings));
+    for (const char* verb : {"wisps", "cut", "transfer"}) addTable(text, verb, settings[verb]);
+  }
   auto render = settings["render"];
   for (const auto& [name, value] : settings["parameters"].items())
     render["set"].push_back(name + "=" + (value.is_string() ? value.get<std::string>() : value.dump()));
@@ -135,13 +134,14 @@ std::string LookExports::script() const {
   whole << file.rdbuf();
   std::string text = whole.str();
   for (const auto& [name, value] : settings["parameters"].items()) {
-    const std::string set = value.is_string() ? value.get<std::string>() : value.dump();
+    std::string set = value.is_string() ? value.get<std::string>() : value.dump();
     // param TYPE NAME = VALUE, up to the range, the text or the end of the statement.
-    const std::regex declared("(\\bparam\\s+[A-Za-z]+(?:\\s*\\[\\s*\\])?\\s+" + name +
+    const std::regex declared("(\\bparam\\s+([A-Za-z]+(?:\\s*\\[\\s*\\])?)\\s+" + name +
                               "\\s*=\\s*)((?:\"[^\"]*\"|\\([^;]*?\\)|[^;\"]*?))(\\s*(?:\\bin\\b|;|\"))");
     std::smatch found;
-    if (std::regex_search(text, found, declared))
-      text = found.prefix().str() + found[1].str() + set + found[3].str() + found.suffix().str();
+    if (!std::regex_search(text, found, declared)) continue;
+    if (found[2] == "string" && !set.starts_with('"')) set = quotedText(set);
+    text = found.prefix().str() + found[1].str() + set + found[4].str() + found.suffix().str();
   }
   return text;
 }

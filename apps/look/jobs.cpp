@@ -8,10 +8,24 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
+#include <string_view>
 
 #include "nephele/modeling/base/error.h"
 
 namespace nephele::apps {
+namespace {
+
+/// What a line says is wrong, without who says it; nothing where it says something else.
+std::optional<std::string> faultIn(const std::string& line) {
+  constexpr std::string_view kMark = ": error: ";
+  const std::size_t mark = line.find(kMark);
+  if (mark == std::string::npos) return std::nullopt;
+  // Of a script, what stands before it is the place of the fault.
+  return line.starts_with("nephele ") ? line.substr(mark + kMark.size()) : line;
+}
+
+}  // namespace
 
 LookJobs::~LookJobs() {
   {
@@ -122,14 +136,19 @@ int LookJobs::runLine(int id, const std::vector<std::string>& line,
   std::FILE* output = fdopen(ends[0], "r");
   char* text = nullptr;
   std::size_t size = 0;
+  // Hints and what else is said go after the error.
+  bool hasFailed = false;
   while (output && getline(&text, &size, output) >= 0) {
     std::string said = text;
     while (!said.empty() && (said.back() == '\n' || said.back() == '\r')) said.pop_back();
     int percent = 0;
-    if (std::sscanf(said.c_str(), "ALF_PROGRESS %d%%", &percent) == 1)
+    if (std::sscanf(said.c_str(), "ALF_PROGRESS %d%%", &percent) == 1) {
       advance(percent / 100.0);
-    else if (!said.empty())
-      last = said;
+    } else if (!said.empty() && !hasFailed) {
+      const std::optional<std::string> fault = faultIn(said);
+      last = fault.value_or(said);
+      hasFailed = fault.has_value();
+    }
   }
   std::free(text);
   if (output) std::fclose(output);

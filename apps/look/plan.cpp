@@ -130,9 +130,7 @@ LookPlan::LookPlan(const LookSubject& itsSubject, const LookSettings& itsSetting
     std::vector<std::string> input;
     if (!subject.path.empty()) input.push_back(subject.path);
     if (verb == "cloud") {
-      // What nobody has given grows on a shape of its own.
-      if (subject.path.empty() && !own.contains("species")) own["species"] = "mediocris";
-      shownCommand_ = parsed(lookCloudVerb(cloud), own, input);
+      shownCommand_ = parsed(lookCloudVerb(cloud), subject.cloudSettings(settings), input);
     } else if (verb == "wisps") {
       shownCommand_ = parsed(lookWispsVerb(wisps), own, input);
     } else if (verb == "cut") {
@@ -151,6 +149,7 @@ LookPlan::LookPlan(const LookSubject& itsSubject, const LookSettings& itsSetting
   if (picture.pathTraced)
     throw LookFault("render", "--integrator: got 'path', allowed: march, while it is looked at");
   try {
+    if (subject.kind != LookSubject::Kind::script) requireNoSettings(scene.script);
     picture = picture.withView();
   } catch (const std::exception& error) {
     throw LookFault("render", error.what());

@@ -11,9 +11,7 @@ namespace nephele::apps {
 namespace {
 
 std::string pageOf(const nlohmann::json& body) {
-  const std::string page = body.value("page", "");
-  if (!isPageName(page)) throw LookFault("", "page: must be letters and digits, at most 32");
-  return page;
+  return checkedPage(body.value("page", ""));
 }
 
 LookShow showOf(const nlohmann::json& body) {
@@ -68,9 +66,11 @@ LookSettings with(LookSettings settings, const WedgeAxis& axis, const std::strin
 
 }  // namespace
 
-bool isPageName(const std::string& text) {
-  return !text.empty() && text.size() <= 32 &&
-         std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c); });
+const std::string& checkedPage(const std::string& name) {
+  if (name.empty() || name.size() > 32 ||
+      !std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c); }))
+    throw LookFault("", "page: must be letters and digits, at most 32");
+  return name;
 }
 
 void readSize(const nlohmann::json& body, int& width, int& height) {

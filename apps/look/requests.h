@@ -44,8 +44,8 @@ struct LookWedge {
   LookShow show{};
 };
 
-/// Whether a page may be called so.
-bool isPageName(const std::string& text);
+/// `name`, if a page may be called so. @throws LookFault.
+const std::string& checkedPage(const std::string& name);
 
 /// What pages send, as docs/look.md describes it. @throws LookFault naming what is wrong.
 LookRequest requestOf(const LookSubject& subject, const nlohmann::json& body);

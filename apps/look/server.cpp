@@ -27,6 +27,8 @@ namespace {
 // Of requests; pictures go the other way.
 constexpr std::size_t kMostBytes = 1 << 20;
 constexpr int kMostThreads = 32, kMostPorts = 100;
+// Of what a page says; JSON is copied by functions that call themselves.
+constexpr int kMostDepth = 32;
 
 std::string randomWord() {
   constexpr char kLetters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012345678901";
@@ -44,6 +46,16 @@ nlohmann::json errorOf(const std::exception& error) {
     one["option"] = fault->option();
   }
   return {{"errors", {one}}};
+}
+
+nlohmann::json bodyOf(const std::string& text) {
+  const auto keep = [](int depth, nlohmann::json::parse_event_t, const nlohmann::json&) {
+    if (depth > kMostDepth) throw LookFault("", fmt::format("the body nests more than {} deep", kMostDepth));
+    return true;
+  };
+  nlohmann::json body = nlohmann::json::parse(text, keep, false);
+  if (!body.is_object()) throw LookFault("", "the body must be a JSON object");
+  return body;
 }
 
 /// Names of files may be in any encoding, but JSON is UTF-8.
@@ -140,6 +152,8 @@ HttpServer::HttpServer(const LookServerOptions& options)
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   });
   route();
+  if (httplib::Server().bind_to_any_port(options_.host) < 0)
+    throw LookFault("", fmt::format("--host: got '{}', which is no address of this machine", options_.host));
   for (int i = 0; i < kMostPorts && port_ == 0 && options_.port + i <= 65535; ++i)
     if (server_.bind_to_port(options_.host, options_.port + i)) port_ = options_.port + i;
   if (port_ == 0)
@@ -194,16 +208,15 @@ void HttpServer::route() {
   server_.Get(
       base + "([a-z_]*\\.?[a-z]*)", [this](const httplib::Request& request, httplib::Response& response) {
         const std::string name = request.matches[1].length() ? request.matches[1].str() : "index.html";
-        if (name == "controls") {
+        if (name == "controls" || name == "stream") {
           try {
-            sendJson(controls(), response);
+            name == "stream" ? stream(request, response) : sendJson(controls(), response);
           } catch (const std::exception& error) {
             response.status = 422;
             sendJson(errorOf(error), response);
           }
           return;
         }
-        if (name == "stream") return stream(request, response);
         if (name == "pixel") {
           const auto number = [&](const char* key) {
             return parseNumber(request.get_param_value(key)).value_or(-1);
@@ -230,9 +243,7 @@ void HttpServer::answer(const std::string& name, Handler handler) {
                [this, handler](const httplib::Request& request, httplib::Response& response) {
                  nlohmann::json result;
                  try {
-                   const nlohmann::json body = nlohmann::json::parse(request.body, nullptr, false);
-                   if (!body.is_object()) throw LookFault("", "the body must be a JSON object");
-                   result = (this->*handler)(body);
+                   result = (this->*handler)(bodyOf(request.body));
                  } catch (const nlohmann::json::exception&) {
                    response.status = 400;
                    result = errorOf(LookFault("", "the body has values of other types than it should"));
@@ -246,7 +257,7 @@ void HttpServer::answer(const std::string& name, Handler handler) {
 
 void HttpServer::stream(const httplib::Request& request, httplib::Response& response) {
   const std::string name = request.get_param_value("page");
-  const std::shared_ptr<LookPage> page = isPageName(name) ? engine_.open(name) : nullptr;
+  const std::shared_ptr<LookPage> page = engine_.open(checkedPage(name));
   if (!page) {
     response.status = 429;
     return sendJson(errorOf(Error(fmt::format("at most {} pages at once", LookEngine::kMostPages))),
@@ -344,6 +355,11 @@ nlohmann::json HttpServer::startJob(const nlohmann::json& body) {
     return (std::filesystem::path(options_.folder) / name).string();
   };
   const std::string path = within(plainFileName(file, kind->second));
+  for (const std::string& source : watched()) {
+    std::error_code isMissing;
+    if (std::filesystem::equivalent(path, source, isMissing))
+      throw LookFault("", fmt::format("file: '{}' is what is looked at; give another name", file));
+  }
   const auto append = [](std::vector<std::string>& line, const std::vector<std::string>& more) {
     line.insert(line.end(), more.begin(), more.end());
   };
@@ -363,6 +379,11 @@ nlohmann::json HttpServer::startJob(const nlohmann::json& body) {
     const bool isTurn = what == "turntable";
     lines.push_back(exports.pictureLine(isTurn ? "turntable" : "render", volume));
     append(lines.back(), {what == "png" ? "--preview" : isTurn ? "--movie" : "-o", path});
+    if (what == "exr") {
+      // As with the command line that is shown: the sky is a layer where there is a preview.
+      temporary.push_back(within("." + randomWord() + ".png"));
+      append(lines.back(), {"--preview", temporary.back()});
+    }
     if (isTurn) append(lines.back(), {"--frames", body.value("frames", "1-48")});
   }
   return {{"id", jobs_.start(what, std::move(lines), std::move(temporary))}};

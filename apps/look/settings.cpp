@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "apps/options/options.h"
+
 namespace nephele::apps {
 namespace {
 
@@ -16,7 +18,7 @@ std::string optionIn(const std::string& message) {
 }
 
 bool isName(const std::string& text) {
-  if (text.empty() || text.size() > 64) return false;
+  if (text.empty() || text.size() > 64 || text.front() == '-') return false;
   for (const char c : text)
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_') return false;
   return true;
@@ -50,6 +52,9 @@ LookSettings checkedSettings(const nlohmann::json& given) {
     if (!values.is_object()) throw LookFault("", "settings: '" + part + "' must be an object");
     for (const auto& [name, value] : values.items()) {
       if (!isName(name)) throw LookFault(part, "settings: '" + name + "' is no name of an option");
+      const bool isOfLine = name == "help" || name == "help-all" || name == "size";
+      if (isOfLine && part != "parameters")
+        throw LookFault(part, fmt::format("--{}: is for command lines, not for settings", name));
       if (!value.is_string() && !value.is_boolean() && !isTexts(value))
         throw LookFault(part, fmt::format("--{}: must be a text, a list of texts, true or false", name));
       result[part][name] = value;
@@ -89,6 +94,8 @@ nlohmann::json settingsOf(const CLI::App& app, const std::vector<std::string>& a
     }
     const std::string name = option->get_lnames().front();
     if (option->get_items_expected_max() == 0) {
+      if (equals != std::string::npos)
+        refuseValue(word, argument.substr(equals + 1), "no value; it is a flag");
       settings[name] = !word.starts_with("--no-");
       continue;
     }

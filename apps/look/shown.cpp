@@ -140,6 +140,8 @@ std::string shownJpeg(const Image& image, const LookShow& show, const ViewTransf
     return coded(normals, plain);
   }
   const bool isLight = show.layer.starts_with("light_");
+  require(!isLight || image.find(show.layer + ".R"),
+          "layer: got '" + show.layer + "', and no light has this name");
   const Image layer = opaqueOf(image, {show.layer + ".R", show.layer + ".G", show.layer + ".B"});
   return coded(layer, isLight ? view : plain);
 }

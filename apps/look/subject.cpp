@@ -19,6 +19,12 @@ std::string LookSubject::stamp() const {
   return path.empty() ? std::string() : fileStamp(path);
 }
 
+LookSettings LookSubject::cloudSettings(const LookSettings& settings) const {
+  LookSettings own = settings["cloud"];
+  if (path.empty() && !own.contains("species")) own["species"] = "mediocris";
+  return own;
+}
+
 std::vector<LookShow::What> LookSubject::views() const {
   using What = LookShow::What;
   std::vector<What> views{What::cloud, What::surface};

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/look/settings.h"
 #include "apps/look/shown.h"
 
 namespace nephele::apps {
@@ -27,6 +28,9 @@ struct LookSubject {
   std::string word() const;
   /// Changes with every change of the file on disk.
   std::string stamp() const;
+
+  /// Settings of `cloud` that grow it: what nobody has given grows on a shape of its own.
+  LookSettings cloudSettings(const LookSettings& settings) const;
 
   /// What can be shown of it.
   std::vector<LookShow::What> views() const;

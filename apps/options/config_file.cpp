@@ -72,7 +72,8 @@ Setting settingOf(const ConfiguredVerb& verb, const TomlFile& file, const toml::
     if (setting.option.get_expected_min() != 0)
       file.refuse(felt::Code::wrongType, value.source(),
                   nephele::quoted(name) + " takes a value, not true or false");
-    if (*flag) setting.values.push_back({value, ""});
+    // Of others, false is how it is where nobody gives them.
+    if (*flag || setting.option.check_lname("no-" + name)) setting.values.push_back({value, ""});
   } else if (const toml::array* list = value.as_array()) {
     for (const toml::node& item : *list) setting.values.push_back(valueOf(file, name, item));
   } else {
@@ -82,10 +83,11 @@ Setting settingOf(const ConfiguredVerb& verb, const TomlFile& file, const toml::
 }
 
 void add(const Setting& setting, std::vector<std::string>& arguments) {
-  const bool isFlag = setting.option.get_expected_min() == 0;
   for (const Setting::Value& value : setting.values)
-    arguments.push_back(isFlag && value.node.is_boolean() ? "--" + setting.name
-                                                          : fmt::format("--{}={}", setting.name, value.text));
+    if (const auto flag = value.node.value_exact<bool>())
+      arguments.push_back((*flag ? "--" : "--no-") + setting.name);
+    else
+      arguments.push_back(fmt::format("--{}={}", setting.name, value.text));
 }
 
 // What a file sets for the verb that `arguments` do not: options, and the table of the verb's own. Tables of

@@ -15,14 +15,16 @@ std::string planeText(const BladePlane& plane) {
   return fmt::format("{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z);
 }
 
-/// The part of space around `box` where `blade` is positive, as a closed mesh.
-Mesh solidOf(const ScalarField& blade, const std::string& text, const Box& box, double voxelSize, float kerf,
-             Run& run) {
-  const Mesh mesh = marchingCubes(*sampledBlade(blade, box, voxelSize, kerf, run), 0.0f, run);
-  if (mesh.faceCount() == 0)
-    throw Error(
-        fmt::format("--knife: '{}' is negative everywhere in the shape's box: it has no blade there", text));
-  return mesh;
+/// The part of space around `box` where `blade` is positive, as a closed mesh; where it is positive nowhere,
+/// one that lies beside the box, and parts nothing.
+Mesh solidOf(const ScalarField& blade, const Box& box, double voxelSize, float kerf, Run& run) {
+  Mesh mesh = marchingCubes(*sampledBlade(blade, box, voxelSize, kerf, run), 0.0f, run);
+  if (mesh.faceCount() > 0) return mesh;
+  const auto voxel = float(voxelSize);
+  const float away = box.longestSide() + 32 * voxel + 4 * kerf;
+  const Vec3f corner = box.max + Vec3f{away, away, away};
+  const Box beside{corner, corner + Vec3f{voxel, voxel, voxel}};
+  return marchingCubes(*sampledBlade(ScalarField(1.0f), beside, voxelSize, kerf, run), 0.0f, run);
 }
 
 }  // namespace
@@ -43,6 +45,9 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
       {.count = a.randomPlanes, .box = box, .throughCentre = a.throughCentre, .seed = std::uint32_t(a.seed)});
   planes.insert(planes.end(), random.begin(), random.end());
   const auto amplitude = float(a.roughness.worldUnits(side));
+  const bool areCellsRough = amplitude > 0 && (a.cellCount > 0 || !a.points.empty());
+  if (areCellsRough && a.geometry == CutArguments::Geometry::levelset)
+    throw CLI::ValidationError("--roughness", "rough walls of cells are for --geometry exact alone");
   if (double(amplitude) > side)
     throw CLI::ValidationError(
         "--roughness",
@@ -77,13 +82,14 @@ CutKnives knivesOf(const CutArguments& a, const std::vector<CutPart>& parts, Run
     const ScalarField blade = evaluated("--knife", text.substr(1), {felt::Kind::scalarField},
                                         namesOfPlace(double(run.frame().value_or(0)), a.seed), side)
                                   .as<ScalarField>();
-    knives.solids.push_back(solidOf(blade, text, box, result.voxelSize, result.options.kerf, run));
+    knives.solids.push_back(solidOf(blade, box, result.voxelSize, result.options.kerf, run));
   }
   if (a.cellCount > 0) {
     run.begin("scatter");
-    knives.cells = scatteredPoints(parts, a.cellCount, std::uint32_t(a.seed));
+    knives.cells = namingFile(fmt::format("{}: --voronoi", a.input),
+                              [&] { return scatteredPoints(parts, a.cellCount, std::uint32_t(a.seed)); });
   }
-  if (amplitude > 0)
+  if (areCellsRough)
     knives.cellRoughness = {.amplitude = amplitude,
                             .noise = {.frequency = float(a.roughnessFrequency.perWorldUnit(side)),
                                       .seed = std::uint32_t(a.seed) * 7919u + 4001u},

@@ -36,6 +36,8 @@ struct CutArguments {
   /// What is to be cut, whole and closed, with level sets if these are to be cut.
   /// @throws Error naming the file.
   std::vector<CutPart> readParts(Run& run) const;
+  /// Refuses a cut that would take away what it reads. @throws Error naming the file.
+  void requireInputsKept() const;
   /// The input is one mesh, not a volume or pieces.
   bool isModel() const;
   /// The pieces, of parts that have level sets if these are to be cut. @throws Error naming the input.

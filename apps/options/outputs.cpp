@@ -26,7 +26,7 @@ bool isMarked(const CLI::Option& option, const char* mark) try {
 /// What is given for an option.
 struct Given {
   std::string option, value;
-  bool isOutput, isTried;
+  bool isOutput, isOfCall, isTried;
   /// Where it leads; empty where no file can be meant.
   fs::path file;
 };
@@ -43,17 +43,17 @@ std::string withoutName(const std::string& value) {
   return value.substr(value.find('=') + 1);
 }
 
-std::vector<Given> givenOptions(CLI::App& app) {
+std::vector<Given> givenOptions(const CLI::App& app) {
   std::vector<Given> result;
-  for (CLI::Option* option : app.get_options()) {
-    const bool isTried = isMarked(*option, kOutput), isOutput = isTried || isMarked(*option, kTriedByVerb);
+  for (const CLI::Option* option : app.get_options()) {
+    const bool isOfCall = isOutputOfCall(*option), isTried = isMarked(*option, kOutput);
     const bool isNamed = option->get_type_name().starts_with("[NAME=]");
     const std::string name = option->get_name(false, true);
     for (const std::string& value : option->results()) {
       const std::string path = isNamed ? withoutName(value) : value;
-      result.push_back({name, path, isOutput, isTried, fileOf(path)});
-      if (!isOutput && withoutName(value) != value)
-        result.push_back({name, value, false, false, fileOf(withoutName(value))});
+      result.push_back({name, path, isOutput(*option), isOfCall, isTried, fileOf(path)});
+      if (!isOutput(*option) && withoutName(value) != value)
+        result.push_back({name, value, false, false, false, fileOf(withoutName(value))});
     }
   }
   return result;
@@ -70,7 +70,23 @@ bool isOutput(const CLI::Option& option) {
   return isMarked(option, kOutput) || isMarked(option, kTriedByVerb);
 }
 
-void requireDistinctOutputs(CLI::App& app) {
+bool isOutputOfCall(const CLI::Option& option) {
+  return isOutput(option) && !option.check_lname("stats") && !option.check_lname("contact-sheet");
+}
+
+std::vector<std::string> outputsOf(const CLI::App& app) {
+  std::vector<std::string> paths;
+  for (const Given& given : givenOptions(app))
+    if (given.isOfCall && !given.file.empty()) paths.push_back(given.value);
+  return paths;
+}
+
+void requireOwnFile(const std::string& option, const std::string& path, std::set<std::string>& known) {
+  if (!known.insert(fileOf(path).string()).second)
+    refuseValue(option, path, "a file that no other of the calls writes");
+}
+
+void requireDistinctOutputs(const CLI::App& app, std::set<std::string>& known) {
   const std::vector<Given> given = givenOptions(app);
   for (std::size_t i = 0; i != given.size(); ++i) {
     const Given& output = given[i];
@@ -83,10 +99,14 @@ void requireDistinctOutputs(CLI::App& app) {
       refuseValue(isLater ? other.option : output.option, output.value,
                   "another file than that of " + (isLater ? output.option : other.option));
     }
+    if (output.isOfCall)
+      requireOwnFile(output.option, output.value, known);
+    else
+      known.insert(output.file.string());
   }
 }
 
-void tryOutputs(CLI::App& app) {
+void tryOutputs(const CLI::App& app) {
   for (const Given& given : givenOptions(app))
     if (given.isTried) const OutputFile trial(given.value);
 }

@@ -8,6 +8,7 @@
 #include "apps/options/picture/colour_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
+#include "nephele/render/image/png_io.h"
 #include "nephele/render/preview/surface_picture.h"
 
 namespace nephele::apps {
@@ -48,7 +49,9 @@ void addPictures(CLI::App& app, TransferArguments& a) {
 
 /// Whether the format of `path` can hold `attribute`, once it is carried.
 bool holds(const std::string& path, const MeshAttribute& attribute) {
-  if (path.empty() || path.ends_with(".ply") || (attribute.name == "uv" && attribute.width == 2)) return true;
+  if (path.empty() || CLI::detail::to_lower(path).ends_with(".ply") ||
+      (attribute.name == "uv" && attribute.width == 2))
+    return true;
   return attribute.domain == MeshAttribute::Domain::vertex && attribute.name == "color" &&
          attribute.width >= 3;
 }
@@ -61,13 +64,27 @@ std::string listed(const std::vector<std::string>& names) {
 
 }  // namespace
 
+void TransferArguments::requireMethod() const {
+  if (warp.method == WarpMethod::nacelle) return;
+  std::vector<const CLI::Option*> others = ofNacelle;
+  // `none` and `fast` say what closest points are.
+  if (warp.align != Alignment::none) others.push_back(align);
+  if (warp.quality != WarpQuality::fast) others.push_back(quality);
+  for (const CLI::Option* option : others)
+    if (option->count() > 0) throw CLI::ValidationError(option->get_name(), "is for --method nacelle alone");
+}
+
 TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& object, const Run& run) const {
   const auto hasUv = [](const Mesh& mesh) {
     return std::ranges::any_of(mesh.attributes,
                                [](const MeshAttribute& a) { return a.name == "uv" && a.width == 2; });
   };
+  for (const auto& [file, mesh] : {std::pair{&from, &reference}, std::pair{&to, &object}})
+    if (!warpedMesh.empty() && !diagnose(*mesh).closed())
+      throw Error(*file + ": is not closed, and --warped-mesh needs what is inside");
+  const bool showsUv = !preview.empty() && !paintsDistortion;
   for (const auto& [option, isGiven] :
-       {std::pair{"--texture", !texture.empty()}, std::pair{"--preview", !preview.empty()}})
+       {std::pair{"--texture", !texture.empty()}, std::pair{"--preview", showsUv}})
     if (isGiven && !hasUv(reference))
       throw Error(fmt::format("{}: has no texture coordinates, which {} needs", from, option));
   if (!bakedTexture.empty() && !hasUv(object))
@@ -97,13 +114,13 @@ TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& obj
                         "--bake-texture is laid out for",
                         to));
     }
-    if (!preview.empty() && bakedTexture.empty() && std::ranges::count(transfer.names, "uv") == 0)
+    if (showsUv && bakedTexture.empty() && std::ranges::count(transfer.names, "uv") == 0)
       refuseValue("--attributes", listed(transfer.names), "a list with uv, which --preview shows");
     return transfer;
   }
   if (!other.empty()) run.note(fmt::format("{} cannot hold {}, left out; a .ply can", output, listed(other)));
   // Without the object all that is to be seen is how its coordinates lie.
-  const bool showsOwn = !preview.empty() && bakedTexture.empty() && !paintsDistortion;
+  const bool showsOwn = showsUv && bakedTexture.empty();
   if (output.empty()) return {showsOwn ? std::vector<std::string>{"uv"} : std::vector<std::string>{}};
   if (fit.empty() && bakedTexture.empty())
     throw Error(fmt::format("{}: has no attributes that {} can hold{}", from, output,
@@ -124,6 +141,19 @@ TextureBakeOptions TransferArguments::bakeOptions(const Image& image) const {
     options.height = image.height;
   }
   return options;
+}
+
+void TransferArguments::writeBaked(const Image& image, const Run& run) const {
+  // More than rounding makes of white.
+  constexpr float kWhite = 1.001f;
+  std::size_t bright = 0;
+  const std::size_t count = image.channels[0].values.size();
+  for (std::size_t i = 0; i < count; ++i)
+    bright += std::ranges::any_of(image.channels, [&](const auto& c) { return c.values[i] > kWhite; });
+  if (bright > 0)
+    run.note(fmt::format("{}: {} of {} texels are brighter than 1, the most that a .png holds", bakedTexture,
+                         bright, count));
+  writePng(bakedTexture, image, {.shoulder = 0.99999f}, run.metadata());
 }
 
 Mesh readShape(const std::string& path, const Run& run) {
@@ -180,24 +210,28 @@ void addTransferOptions(CLI::App& app, TransferArguments& a) {
   addChoice(app, "--method", a.warp.method,
             {{"nacelle", WarpMethod::nacelle}, {"closest", WarpMethod::closest}},
             "A warp field between level sets, or closest points.");
-  addChoice(
+  a.align = addChoice(
       app, "--align", a.warp.align,
       {{"none", Alignment::none}, {"similarity", Alignment::similarity}, {"lattice", Alignment::lattice}},
       "Turn, scale and shift the object onto the reference first; lattice: and bend it.");
-  addChoice(app, "--quality", a.warp.quality,
-            {{"fast", WarpQuality::fast}, {"balanced", WarpQuality::balanced}, {"best", WarpQuality::best}},
-            "fast: the warp field as it is; else relaxed where it folds over, for longer with best.");
-  addCount(app, "--iterations", a.warp.steps, 1, 20, "Steps of the warp field at most.");
-  addCount(app, "--order", a.warp.order, 1, 2, "Of a step: 1 along gradients, 2 with second derivatives.")
-      ->default_str("1");
+  a.quality = addChoice(
+      app, "--quality", a.warp.quality,
+      {{"fast", WarpQuality::fast}, {"balanced", WarpQuality::balanced}, {"best", WarpQuality::best}},
+      "fast: the warp field as it is; else relaxed where it folds over, for longer with best.");
+  CLI::Option* iterations =
+      addCount(app, "--iterations", a.warp.steps, 1, 20, "Steps of the warp field at most.");
+  CLI::Option* order =
+      addCount(app, "--order", a.warp.order, 1, 2, "Of a step: 1 along gradients, 2 with second derivatives.")
+          ->default_str("1");
   addCount(
       app, "--resolution", a.resolution, 8, 100000,
       "Voxels along the longest side: of the reference, the unit of residuals; of the object, for --warp "
       "and --warped-mesh.");
   addOutput(app, "--warp", a.warpFile, {".vdb"},
             "Write the map as a vector grid 'rest', in bricks about the object.");
-  addOutput(app, "--warped-mesh", a.warpedMesh, {".obj", ".ply", ".stl"},
-            "Write the reference's level set, warped, as a mesh.");
+  CLI::Option* warpedMesh = addOutput(app, "--warped-mesh", a.warpedMesh, {".obj", ".ply", ".stl"},
+                                      "Write the reference's level set, warped, as a mesh.");
+  a.ofNacelle = {iterations, order, warpedMesh};
   addPictures(app, a);
   requireOneOutput(app, {"--output", "--preview", "--bake-texture", "--warp", "--warped-mesh"});
 }

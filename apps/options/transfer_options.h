@@ -30,14 +30,21 @@ struct TransferArguments {
   TransferPictureOptions picture;
   /// What the preview shows: the attributes, or how well the map keeps shapes.
   bool paintsDistortion = false;
+  const CLI::Option *align = nullptr, *quality = nullptr;
+  /// What --method nacelle has alone, beside these.
+  std::vector<const CLI::Option*> ofNacelle;
 
   /// What messages call the result: the first of its files.
   const std::string& name() const;
+  /// Refuses options that the method does not have. @throws CLI::ValidationError naming them.
+  void requireMethod() const;
   /// The attributes to carry: those asked for, or all that the output can hold. Says what is left out.
   /// @throws Error naming a file that lacks what is asked for or cannot hold it.
   TransferOptions chosen(const Mesh& reference, const Mesh& object, const Run& run) const;
   /// `bake` with its size filled in.
   TextureBakeOptions bakeOptions(const Image& image) const;
+  /// Writes the baked texture, and says what the file cannot hold of it.
+  void writeBaked(const Image& image, const Run& run) const;
   /// `object` mapped to `reference`, with `options` at the resolution asked for.
   /// @throws Error naming both files, or the option to change where it needs too much memory; Cancelled.
   MeshWarp warped(const Mesh& reference, const Mesh& object, MeshWarpOptions options, const Run& run) const;

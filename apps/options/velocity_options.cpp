@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "apps/options/expression_names.h"
 #include "nephele/levelset/flow/advection_files.h"
@@ -114,9 +115,13 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
   if (word == "noise" || word == "curl") {
     velocity.source = word == "noise" ? VelocityArguments::Source::noise : VelocityArguments::Source::curl;
     std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
+    std::set<std::string> given;
     while (!rest.empty()) {
       const std::size_t comma = rest.find(',');
-      set(velocity, Entry(name, rest.substr(0, comma)));
+      const Entry entry(name, rest.substr(0, comma));
+      if (!given.insert(entry.key).second)
+        refuseValue(name, text, "each key once; " + entry.key + " is there twice");
+      set(velocity, entry);
       rest = comma == std::string::npos ? "" : rest.substr(comma + 1);
     }
     const bool hasCreases =
@@ -144,6 +149,8 @@ void parseVelocity(const std::string& name, const std::string& text, VelocityArg
 
 VectorField VelocityArguments::field(double longestSide, double frame, int seedOfAll) const {
   if (source == Source::file) return readVelocity(path, grid);
+  if (!grid.empty())
+    throw CLI::ValidationError("--velocity-grid", "is for a --velocity that comes from a file");
   if (source == Source::constant) {
     Vec3f same;
     for (int i = 0; i < 3; ++i) same[i] = float(constant[std::size_t(i)].worldUnits(longestSide));

@@ -16,6 +16,7 @@ namespace {
 void cut(const CutArguments& arguments, Run& run) {
   // Says now what could not be written in the end.
   if (!arguments.folder.empty()) requireWritableFolder(arguments.folder);
+  arguments.requireInputsKept();
   if (!arguments.preview.empty())
     run.requireMemory(estimateSurfacePictureBytes(arguments.picture.width, arguments.picture.height),
                       "make the preview smaller (--size)");
@@ -25,7 +26,8 @@ void cut(const CutArguments& arguments, Run& run) {
     return mesh.faceCount() > 0 ? countSelfIntersections(mesh, 100).value_or(0) : 0;
   });
   const CutKnives knives = knivesOf(arguments, parts, run);
-  if (arguments.geometry == CutArguments::Geometry::levelset) addLevelSets(parts, knives.voxelSize, run);
+  if (arguments.geometry == CutArguments::Geometry::levelset)
+    namingFile(arguments.input, [&] { addLevelSets(parts, knives.voxelSize, run); });
   const Pieces pieces = arguments.cut(parts, knives, run);
   if (pieces.pieces.empty())
     throw Error(

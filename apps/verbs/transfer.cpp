@@ -45,6 +45,7 @@ void writeWarp(const TransferArguments& arguments, const Mesh& reference, const 
 }
 
 void transfer(const TransferArguments& arguments, Run& run) {
+  arguments.requireMethod();
   run.begin("read");
   const Mesh reference = readShape(arguments.from, run);
   const Mesh object = subdividedAsAsked(readShape(arguments.to, run), arguments.subdivide, run);
@@ -69,7 +70,7 @@ void transfer(const TransferArguments& arguments, Run& run) {
     const BakedTexture bake = bakeTexture(reference, *texture, object, warp.images, bakeOptions, run);
     run.stats["texels_covered"] = bake.covered;
     baked = std::make_shared<const Image>(bake.image);
-    writePng(arguments.bakedTexture, *baked, {.shoulder = 0.99999f}, run.metadata());
+    arguments.writeBaked(*baked, run);
   }
   if (!arguments.preview.empty())
     writePng(arguments.preview,

@@ -1,3 +1,7 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "apps/options/transform_options.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/moved.h"
@@ -25,6 +29,17 @@ std::vector<VdbGrid> turnedGrids(const TransformOptions& options) {
   return grids;
 }
 
+// Farther off, doubles no longer tell the size of a voxel to a thousandth.
+void requireNear(const VdbGrid& grid, const Box& box, const Similarity& shift) {
+  constexpr double kMostVoxels = 1e12;
+  const double distance = length((box.isEmpty() ? Vec3d{} : Vec3d(box.center())) + shift.shift);
+  const VdbGridInfo info = describe(grid);
+  const double voxel = double(std::min({info.voxelSize.x, info.voxelSize.y, info.voxelSize.z}));
+  require(distance <= kMostVoxels * voxel,
+          fmt::format("grid '{}' would be {:g} world units from the origin, too far for voxels of {:g}",
+                      info.name, distance, voxel));
+}
+
 Box boxOf(const std::vector<VdbGrid>& grids) {
   Box box;
   for (const VdbGrid& grid : grids) box = box.including(contentBox(grid));
@@ -35,7 +50,11 @@ void moveVolume(const TransformOptions& options, Run& run) {
   std::vector<VdbGrid> grids = turnedGrids(options);
   const Box box = run.box(boxOf(grids));
   namingFile(options.input, [&] {
-    for (VdbGrid& grid : grids) grid = moved(grid, options.shift(box));
+    const Similarity shift = options.shift(box);
+    for (VdbGrid& grid : grids) {
+      requireNear(grid, box, shift);
+      grid = moved(grid, shift);
+    }
   });
   run.begin("write");
   writeVdbFile(options.output, grids, run.metadata());

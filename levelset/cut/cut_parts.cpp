@@ -3,7 +3,7 @@
 // Every part is cut by itself; names follow from its own. Contacts across parts, whose common faces were made
 // by an earlier cut and may have been cut again from either side, are found by triangles of the same place:
 // both sides were cut by the same knives, so that they are the same triangles up to rounding. Level sets have
-// no such faces; there the other side is looked for a little in front of each inner triangle.
+// no such faces; there the other side is looked for a little in front of each triangle.
 #include "nephele/levelset/cut/cut_parts.h"
 
 #include <fmt/format.h>
@@ -82,22 +82,16 @@ Pieces gathered(std::vector<Pieces> ofParts) {
   return all;
 }
 
-/// Calls f(face) for every face of the groups called `inside`.
-template <class F>
-void forInnerFaces(const Mesh& mesh, const F& f) {
-  for (const MeshGroup& group : mesh.groups)
-    if (group.name == kInsideGroup)
-      for (std::size_t i = group.firstFace; i < std::size_t(group.firstFace) + group.faceCount; ++i) f(i);
-}
-
-/// Contacts by inner triangles of the same place, up to rounding.
+/// Contacts by triangles of the same place that look at each other, up to rounding. All of them may be such:
+/// not every format keeps which faces an earlier cut made.
 void findNeighbours(std::vector<Piece>& pieces) {
   // A direction, no longer than 1, across which no model has many points.
   constexpr Vec3d kAcross{0.8417, 0.4273, 0.3291};
   struct Triangle {
     double key;
     Vec3d middle;
-    double area;
+    /// As long as twice the area.
+    Vec3d normal;
     std::uint32_t piece;
     bool isMatched = false;
   };
@@ -107,11 +101,11 @@ void findNeighbours(std::vector<Piece>& pieces) {
     const Mesh& mesh = pieces[p].mesh;
     low = min(low, pieces[p].boxMin);
     high = max(high, pieces[p].boxMax);
-    forInnerFaces(mesh, [&](std::size_t f) {
-      if (mesh.face(f).size() != 3) return;
+    for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
+      if (mesh.face(f).size() != 3) continue;
       const Vec3d middle = middleOf(mesh, f);
-      triangles.push_back({dot(middle, kAcross), middle, length(normalOf(mesh, f)) / 2, p});
-    });
+      triangles.push_back({dot(middle, kAcross), middle, normalOf(mesh, f), p});
+    }
   }
   const double size = length(high - low), tolerance = 1e-10 * size;
   std::sort(triangles.begin(), triangles.end(), [](const Triangle& a, const Triangle& b) {
@@ -124,10 +118,10 @@ void findNeighbours(std::vector<Piece>& pieces) {
          ++j) {
       Triangle& b = triangles[j];
       if (b.isMatched || b.piece == a.piece || length(b.middle - a.middle) > tolerance ||
-          std::abs(b.area - a.area) > tolerance * size)
+          length(a.normal + b.normal) > tolerance * size)
         continue;
       a.isMatched = b.isMatched = true;
-      areas[std::minmax(a.piece, b.piece)] += a.area;
+      areas[std::minmax(a.piece, b.piece)] += length(a.normal) / 2;
     }
   }
   detail::setNeighbours(pieces, areas);
@@ -185,8 +179,10 @@ std::size_t groupInnerFaces(Mesh& mesh, const ScalarField& shape, float depth) {
   return count - first;
 }
 
-/// Contacts of level-set pieces: what is a voxel in front of inner triangles.
-void findNeighboursOfLevelSets(std::vector<Piece>& pieces, const Progress& progress) {
+/// Contacts of level-set pieces: what is a voxel in front of triangles. `partOf` has the part of each piece;
+/// a kerf parts pieces of one part.
+void findNeighboursOfLevelSets(std::vector<Piece>& pieces, const std::vector<std::size_t>& partOf,
+                               bool hasKerf, const Progress& progress) {
   std::vector<std::map<std::uint32_t, double>> seen(pieces.size());
   parallelFor(
       pieces.size(), 1,
@@ -194,17 +190,31 @@ void findNeighboursOfLevelSets(std::vector<Piece>& pieces, const Progress& progr
         for (std::size_t p = begin; p < end; ++p) {
           const Piece& piece = pieces[p];
           const double reach = double(piece.level->voxelSize());
+          const auto isOfSamePart = [&](std::uint32_t q) { return partOf[q] == partOf[p]; };
           std::vector<std::uint32_t> near;
           for (std::uint32_t q = 0; q < pieces.size(); ++q) {
             const Vec3d gap = max(pieces[q].boxMin - piece.boxMax, piece.boxMin - pieces[q].boxMax);
-            if (q != p && std::max({gap.x, gap.y, gap.z}) <= reach) near.push_back(q);
+            if (q != p && !(hasKerf && isOfSamePart(q)) && std::max({gap.x, gap.y, gap.z}) <= reach)
+              near.push_back(q);
           }
-          forInnerFaces(piece.mesh, [&](std::size_t f) {
-            const Vec3d normal = normalOf(piece.mesh, f);
+          if (near.empty()) continue;
+          // What no knife has touched has the mesh of its part, whose triangles may be too large to look
+          // from.
+          const bool isAlone = std::ranges::count(partOf, partOf[p]) == 1;
+          const Mesh own = isAlone ? marchingCubes(*piece.level->toBricks()) : Mesh();
+          const Mesh& mesh = isAlone ? own : piece.mesh;
+          // Faces of an earlier cut are outer ones of a part.
+          std::size_t firstInner = mesh.faceCount();
+          for (const MeshGroup& group : mesh.groups)
+            if (group.name == kInsideGroup) firstInner = group.firstFace;
+          for (std::size_t f = std::ranges::all_of(near, isOfSamePart) ? firstInner : 0; f < mesh.faceCount();
+               ++f) {
+            const Vec3d normal = normalOf(mesh, f);
             const double area = length(normal) / 2;
-            if (area == 0) return;
-            const Vec3f front(middleOf(piece.mesh, f) + normal * (0.75 * reach / (2 * area)));
+            if (area == 0) continue;
+            const Vec3f front(middleOf(mesh, f) + normal * (0.75 * reach / (2 * area)));
             for (const std::uint32_t q : near) {
+              if (f < firstInner && isOfSamePart(q)) continue;
               const PieceLevelSet& level = *pieces[q].level;
               const Vec3f v = front * (1 / level.voxelSize());
               const auto nearest = [](float c) { return int(std::lround(c)); };
@@ -212,13 +222,14 @@ void findNeighboursOfLevelSets(std::vector<Piece>& pieces, const Progress& progr
               seen[p][q] += area;
               break;
             }
-          });
+          }
         }
       },
       progress);
+  // The mean of both sides, or what one of them alone has seen.
   ContactAreas areas;
   for (std::uint32_t p = 0; p < pieces.size(); ++p)
-    for (const auto& [q, area] : seen[p]) areas[std::minmax(p, q)] += area / 2;
+    for (const auto& [q, area] : seen[p]) areas[std::minmax(p, q)] += seen[q].contains(p) ? area / 2 : area;
   detail::setNeighbours(pieces, areas);
 }
 
@@ -281,11 +292,16 @@ Pieces cutIntoLevelSets(std::span<const CutPart> parts, double voxelSize, const 
                         const CutOptions& options, const Progress& progress) {
   requireNames(parts);
   std::vector<Pieces> results;
-  const Knives fields{.cells = knives.cells, .fields = asFields(knives, voxelSize, options.kerf, progress)};
-  for (const CutPart& part : parts)
+  std::vector<std::size_t> partOf;
+  const Knives fields{.cells = knives.cells,
+                      .cellRoughness = knives.cellRoughness,
+                      .fields = asFields(knives, voxelSize, options.kerf, progress)};
+  for (const CutPart& part : parts) {
     results.push_back(cutLevel(part, float(voxelSize), fields, options, progress));
+    partOf.insert(partOf.end(), results.back().pieces.size(), results.size());
+  }
   Pieces pieces = gathered(std::move(results));
-  if (options.kerf == 0) findNeighboursOfLevelSets(pieces.pieces, progress);
+  findNeighboursOfLevelSets(pieces.pieces, partOf, options.kerf > 0, progress);
   detail::checkClosed(pieces.pieces, progress);
   return pieces;
 }

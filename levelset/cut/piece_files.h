@@ -50,6 +50,11 @@ void requireWritableFolder(const std::string& folder);
 /// @throws Error naming the path: no folder, no meshes, or one that is listed but not there.
 std::vector<CutPart> readPieces(const std::string& folder, const Progress& progress = silent());
 
+/// Whether the pieces.json beside a file lists it, so that `writePieces` to its folder replaces or removes
+/// it.
+/// @throws Error if that list is not one of a cut.
+bool isListedPiece(const std::string& path);
+
 /// `+` or `-` for each knife.
 std::string codeText(const PieceCode& code);
 

@@ -181,6 +181,7 @@ void writeObj(std::FILE* stream, const Mesh& mesh, const std::string& folder) {
   writeObjLibraries(out, mesh.materialFiles, folder);
   const ObjCoordinates uv = writeObjPoints(out, mesh);
   writeObjFaces(out, mesh, uv);
+  out.text(kObjEnd);
 }
 
 }  // namespace nephele::detail

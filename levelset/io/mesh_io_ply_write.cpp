@@ -1,7 +1,8 @@
 // PLY, binary little-endian: writing.
 //
-// Positions are floats where that loses nothing, else doubles. Texture coordinates stay with vertices where
-// every corner of a vertex has the same; other attributes of corners are lists of the faces.
+// Positions are floats where that loses nothing, else doubles, and colours bytes where that loses nothing,
+// else floats. Texture coordinates stay with vertices where every corner of a vertex has the same; other
+// attributes of corners are lists of the faces.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,6 +33,13 @@ bool isSingleValued(const Mesh& mesh, const MeshAttribute& attribute, std::vecto
     seen[mesh.corners[c]] = true;
   }
   return true;
+}
+
+// True if bytes read back as these colours.
+bool fitBytes(const std::vector<float>& colors) {
+  return std::ranges::all_of(colors, [](float value) {
+    return value >= 0 && value <= 1 && value == static_cast<float>(std::lround(255 * value) * (1.0 / 255));
+  });
 }
 
 // Names of the properties of one element, each a word. Of two of the same name readers keep one, or mix them
@@ -133,8 +141,9 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
   for (const char* axis : {"x", "y", "z"})
     out.text(fmt::format("property {} {}\n", fitsFloat ? "float" : "double", names.add(axis)));
   static constexpr const char* kChannels[] = {"red", "green", "blue", "alpha"};
+  const bool hasBytes = color && fitBytes(color->values);
   for (int k = 0; color && k < color->width; ++k)
-    out.text(fmt::format("property uchar {}\n", names.add(kChannels[k])));
+    out.text(fmt::format("property {} {}\n", hasBytes ? "uchar" : "float", names.add(kChannels[k])));
   for (const char* coordinate : {"s", "t"})
     if (uvPerVertex) out.text(fmt::format("property float {}\n", names.add(coordinate)));
   for (const MeshAttribute* a : others)
@@ -159,7 +168,10 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
     }
     for (std::size_t k = 0; color && k < static_cast<std::size_t>(color->width); ++k) {
       const float c = color->values[v * static_cast<std::size_t>(color->width) + k];
-      out.put(static_cast<std::uint8_t>(std::lround(255 * (c > 0 ? std::min(c, 1.0f) : 0.0f))));
+      if (hasBytes)
+        out.put(static_cast<std::uint8_t>(std::lround(255 * c)));
+      else
+        out.put(c);
     }
     for (std::size_t k = 0; uvPerVertex && k < 2; ++k) out.put(vertexUvs[2 * v + k]);
     for (const MeshAttribute* a : others)

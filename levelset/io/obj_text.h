@@ -9,8 +9,11 @@
 
 #include "nephele/modeling/base/mesh.h"
 
-// Text of OBJ files. Not for other folders.
+// Text of OBJ files.
 namespace nephele::detail {
+
+/// The last line of meshes, by which those that were cut off are known; to readers it is a comment.
+inline constexpr std::string_view kObjEnd = "# end\n";
 
 /// Text on its way to a file, in large pieces, or kept where there is no file.
 class TextWriter {

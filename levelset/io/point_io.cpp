@@ -45,6 +45,14 @@ std::optional<double> numberOf(std::string_view text) {
   return value;
 }
 
+/// Also one that is not finite, or beyond what doubles hold.
+bool isNumber(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [last, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error != std::errc::invalid_argument && last == text.data() + text.size();
+}
+
 /// The columns that hold x, y and z.
 using Axes = std::array<std::size_t, 3>;
 
@@ -155,7 +163,7 @@ Mesh readTable(const detail::MeshFile& file) {
     if (const auto p = pointOf(columns, axes)) {
       mesh.positions.push_back(*p);
       others.add(columns);
-    } else if (isFirst && !numberOf(columns[0])) {
+    } else if (isFirst && std::ranges::none_of(columns, isNumber)) {
       if (const auto titled = axesOf(columns)) {
         axes = *titled;
         others = OtherColumns(columns, axes);

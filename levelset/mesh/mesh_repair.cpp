@@ -116,7 +116,7 @@ class Ladder {
   void requireGood() {
     const MeshDiagnosis& d = result_.before;
     require(d.closed(),
-            fmt::format("mesh repair: the mesh is not closed: {}; repair mode 'auto' would repair it",
+            fmt::format("mesh repair: the mesh is not closed: {}; repair mode 'auto' may repair it",
                         joined(d.problems())));
     require(!d.inward(),
             "mesh repair: the mesh is closed but oriented inwards; repair mode 'auto' would turn it");

@@ -52,8 +52,8 @@ std::string thinText(const Mesh& mesh, const VoxelGrid<float>& grid, const std::
                                                  : "thinner than a voxel");
   }
   return fmt::format(
-      "{}: the shape is too thin for a voxel size of {:.4g}{}; try resolution {:.0f} (voxel "
-      "size {:.4g})",
+      "{}: the shape is too thin for a voxel size of {:.4g}{}; try resolution {:.0f} along its longest side "
+      "(voxel size {:.4g})",
       what, grid.voxelSize(), where, std::ceil(boundingBox(mesh).longestSide() / better), better);
 }
 

@@ -407,6 +407,7 @@ MeshWarp warpMesh(const Mesh& reference, const Mesh& object, const MeshWarpOptio
   const PointLanes points(pair.laid.positions);
   if (options.method == WarpMethod::closest) {
     result.images = snapped(pair, points, progress);
+    result.unconvergedFraction = 1;
   } else {
     PointLanes ends(points.x.size());
     const NacelleStatistics statistics =

@@ -53,7 +53,7 @@ struct MeshWarp {
   ScalarField object = 0.0f, reference = 0.0f;
   /// Residuals at the object's positions, after alignment and after each step; in voxels.
   std::vector<WarpResidual> iterations;
-  /// Share of the object's positions that took the closest-point fallback.
+  /// Share of the object's positions that took the reference's nearest point: 1 for `closest`.
   double unconvergedFraction = 0;
   /// What the object was turned, scaled and shifted by.
   Similarity alignment;

@@ -108,23 +108,25 @@ Knife roughKnife(const BladePlane& blade, const RoughnessOptions& options) {
 std::vector<Vec3f> scatteredPoints(const ScalarField& shape, const Box& box, int count, std::uint32_t seed) {
   require(count >= 0, "scatteredPoints: count must be >= 0, got " + std::to_string(count));
   requireBox(box, "scatteredPoints");
-  constexpr int kMostDraws = 1000;
+  constexpr std::size_t kMostMisses = 1000000;
   detail::Draw draw(seed);
   std::vector<Vec3f> points;
   std::array<std::vector<float>, 3> lanes;
   for (auto& lane : lanes) lane.resize(kBlockSize);
   std::vector<float> values(kBlockSize);
-  for (std::size_t tried = 0; points.size() < std::size_t(count); tried += kBlockSize) {
-    require(tried < (std::size_t(count) + 1) * kMostDraws,
-            "scatteredPoints: the shape fills too little of its box to find " + std::to_string(count) +
-                " points inside");
+  for (std::size_t misses = 0; points.size() < std::size_t(count); misses += kBlockSize) {
+    require(misses < kMostMisses, "scatteredPoints: the shape fills too little of its box to find " +
+                                      std::to_string(count) + " points inside; choose points of your own");
     for (std::size_t i = 0; i < kBlockSize; ++i) {
       const Vec3f p = drawnPoint(draw, box);
       for (int axis = 0; axis < 3; ++axis) lanes[std::size_t(axis)][i] = p[axis];
     }
     shape.eval({lanes[0], lanes[1], lanes[2]}, values);
     for (std::size_t i = 0; i < kBlockSize && points.size() < std::size_t(count); ++i)
-      if (values[i] > 0) points.push_back({lanes[0][i], lanes[1][i], lanes[2][i]});
+      if (values[i] > 0) {
+        points.push_back({lanes[0][i], lanes[1][i], lanes[2][i]});
+        misses = 0;
+      }
   }
   return points;
 }

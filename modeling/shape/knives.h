@@ -62,7 +62,7 @@ struct RoughnessOptions {
 Knife roughKnife(const BladePlane& blade, const RoughnessOptions& options);
 
 /// `count` points spread evenly at random over the inside (> 0) of `shape` in `box`.
-/// @throws Error if count < 0, the box is empty or unbounded, or 1000 draws for each point are not enough.
+/// @throws Error if count < 0, the box is empty or unbounded, or a million draws find no point.
 std::vector<Vec3f> scatteredPoints(const ScalarField& shape, const Box& box, int count, std::uint32_t seed);
 
 /// The cell of points[index]: positive where it is the nearest of all, the distance to the cell's boundary

@@ -119,9 +119,12 @@ std::pair<OCIO::GroupTransformRcPtr, std::string> entrance(const OCIO::ConstConf
   return {steps, OCIO::ROLE_SCENE_LINEAR};
 }
 
-}  // namespace
+struct NamedProcessor {
+  std::string name;
+  OCIO::ConstCPUProcessorRcPtr processor;
+};
 
-std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string& view) {
+NamedProcessor readProcessor(const std::string& path, const std::string& view) {
   requireWholeName(path);
   const Silence silence;
   try {
@@ -143,19 +146,29 @@ std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const 
     shown->setView(name.c_str());
     steps->appendTransform(shown);
     detail::checkTransform(config, steps);
-    const OCIO::ConstCPUProcessorRcPtr processor =
-        config->getProcessor(steps, OCIO::TRANSFORM_DIR_FORWARD)->getDefaultCPUProcessor();
-    const auto apply = [processor](std::span<float> rgb) {
-      OCIO::PackedImageDesc pixels(rgb.data(), long(rgb.size() / 3), 1, 3);
-      processor->apply(pixels);
-    };
-    return std::make_shared<ConfigView>(ConfigView{display + "/" + name, apply});
+    return {display + "/" + name,
+            config->getProcessor(steps, OCIO::TRANSFORM_DIR_FORWARD)->getDefaultCPUProcessor()};
   } catch (const OCIO::Exception& error) {
     throw Error(fmt::format("{}: cannot be used as an OpenColorIO configuration: {}", path,
                             reasonOf(path, error.what())));
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", path, error.what()));
   }
+}
+
+}  // namespace
+
+std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string& view) {
+  const auto [name, processor] = readProcessor(path, view);
+  const auto apply = [processor = processor](std::span<float> rgb) {
+    OCIO::PackedImageDesc pixels(rgb.data(), long(rgb.size() / 3), 1, 3);
+    processor->apply(pixels);
+  };
+  return std::make_shared<ConfigView>(ConfigView{name, apply});
+}
+
+std::string configViewIdentity(const std::string& path, const std::string& view) {
+  return readProcessor(path, view).processor->getCacheID();
 }
 
 }  // namespace nephele

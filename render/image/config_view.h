@@ -18,4 +18,8 @@ namespace nephele {
 /// such view (the message lists those that there are), or if this library was built without OpenColorIO.
 std::shared_ptr<const ConfigView> readConfigView(const std::string& path, const std::string& view);
 
+/// Says what such a view does: equal where two views show the same, whatever files they were read from.
+/// @throws Error as readConfigView does.
+std::string configViewIdentity(const std::string& path, const std::string& view);
+
 }  // namespace nephele

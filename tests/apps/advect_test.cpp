@@ -208,12 +208,26 @@ TEST_F(AdvectVerb, TakesVectorsInPercent) {
 }
 
 TEST_F(AdvectVerb, BadOptionsAreUsageErrorsThatNameThem) {
-  for (const std::string bad :
-       {"--steps -1", "--steps 2.5", "--dt nan", "--dt inf", "--dt 1e300", "--method wind", "--scheme best",
-        "--map map.obj", "--map-coarseness 0", "--rebake 101", "--velocity gale",
-        "--velocity noise:amplitude=-1%", "--velocity noise:amplitude", "--velocity noise:frequency=0x",
-        "--velocity noise:octaves=0", "--velocity curl:kind=worley", "--velocity noise:kind=loud",
-        "--velocity curl:seed=1.5"}) {
+  for (const std::string bad : {"--steps -1",
+                                "--steps 2.5",
+                                "--dt nan",
+                                "--dt inf",
+                                "--dt 1e300",
+                                "--method wind",
+                                "--scheme best",
+                                "--map map.obj",
+                                "--map-coarseness 0",
+                                "--rebake 101",
+                                "--velocity gale",
+                                "--velocity noise:amplitude=-1%",
+                                "--velocity noise:amplitude",
+                                "--velocity noise:frequency=0x",
+                                "--velocity noise:octaves=0",
+                                "--velocity curl:kind=worley",
+                                "--velocity noise:kind=loud",
+                                "--velocity curl:seed=1.5",
+                                "--velocity curl:seed=1,seed=2",
+                                "--velocity noise --velocity-grid v"}) {
     const std::string velocity = bad.starts_with("--velocity") ? "" : " --velocity noise ";
     const ProgramResult result = advect("out.vdb", velocity + bad);
     EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;

@@ -72,6 +72,34 @@ TEST_F(CutVerb, FilesThatNoListNamesAreNeverReplaced) {
   EXPECT_TRUE(fs::exists(file("box.ply")));
 }
 
+// Their place would be made for the new ones.
+TEST_F(CutVerb, PiecesAreNotReadFromTheFolderThatIsWritten) {
+  cut(box() + " --plane 0,0.5,0,0,1,0");
+  const std::vector<std::string> before = namesIn("out");
+  for (const std::string& arguments : {file("out/piece_0002.obj") + " --plane 0,0.75,0,0,1,0",
+                                       file("out/pieces.obj") + " --plane 0,0.75,0,0,1,0",
+                                       box() + " --knife " + file("out/piece_0001.obj")}) {
+    const ProgramResult result = attempt(arguments);
+    EXPECT_EQ(result.exitCode, 1);
+    EXPECT_NE(result.errors.find("give the folder"), std::string::npos) << result.errors;
+    EXPECT_EQ(namesIn("out"), before);
+  }
+  // What no cut has made stays where it is.
+  cut(meshFile("out/own.ply", boxMesh({-1, -1, -1}, {1, 1, 1})) + " --plane 0,0.5,0,0,1,0");
+  EXPECT_TRUE(fs::exists(file("out/own.ply")));
+}
+
+TEST_F(CutVerb, APieceThatIsTooThinForItsVoxelsIsNamed) {
+  fs::create_directory(file("models"));
+  meshFile("models/thick.ply", boxMesh({-2, 0, 0}, {-1, 1, 1}));
+  meshFile("models/thin.ply", boxMesh({1, 0, 0}, {2, 1, 0.01}));
+  const ProgramResult result =
+      attempt(file("models") + " --plane 1.5,0,0,1,0,0 --geometry levelset --resolution 64");
+  EXPECT_EQ(result.exitCode, 1);
+  for (const char* said : {"models: thin: level set", "along its longest side"})
+    EXPECT_NE(result.errors.find(said), std::string::npos) << result.errors;
+}
+
 TEST_F(CutVerb, TwoCutsIntoOneFolderLeaveOneWholeFolder) {
   const std::string model = ball();
   for (const bool isThere : {false, true}) {
@@ -199,6 +227,9 @@ TEST_F(CutVerb, BadOptionsAreUsageErrorsThatNameThem) {
   const ProgramResult none = attempt(model);
   EXPECT_EQ(none.exitCode, 2);
   EXPECT_NE(none.errors.find("no knife"), std::string::npos) << none.errors;
+  const ProgramResult rough = attempt(model + " --voronoi 3 --roughness 1% --geometry levelset");
+  EXPECT_EQ(rough.exitCode, 2);
+  EXPECT_NE(rough.errors.find("--roughness"), std::string::npos) << rough.errors;
   EXPECT_EQ(attempt(model + " --through-center --voronoi 3").exitCode, 2);
   EXPECT_EQ(attempt(model + " --voronoi 3 --points p.txt").exitCode, 2);
   EXPECT_EQ(attempt(model + " --random-planes 1 --size 10x10").exitCode, 2);

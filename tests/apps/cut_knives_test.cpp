@@ -109,6 +109,16 @@ TEST_F(CutVerb, VoronoiCellsComeFromPointsOrAreScattered) {
   }
 }
 
+TEST_F(CutVerb, PointsAreScatteredInSlantedThinModels) {
+  // A plate of 2 x 2 x 0.002 across (1, 1, 1), which fills 1/700 of its box and less of the samples in it.
+  Mesh plate = boxMesh({-1, -1, -0.001}, {1, 1, 0.001});
+  for (Vec3d& p : plate.positions)
+    p = normalize(Vec3d{1, -1, 0}) * p.x + normalize(Vec3d{1, 1, -2}) * p.y + normalize(Vec3d{1, 1, 1}) * p.z;
+  cut(meshFile("plate.ply", plate) + " --voronoi 5");
+  EXPECT_EQ(list()["cells"].size(), 5u);
+  EXPECT_NEAR(double(stats()["volume_sum"]), 0.008, 1e-9);
+}
+
 TEST_F(CutVerb, RoughPlanesAreWavyAndKeepTheVolume) {
   const std::string arguments = ball() + " --plane 0,0,0,0,0,1 --roughness 2% --roughness-octaves 2";
   cut(arguments);
@@ -225,6 +235,15 @@ TEST_F(CutVerb, AKnifeThatMissesLeavesOnePieceAndIsNamed) {
   EXPECT_NE(result.output.find("1 piece: no knife parts the model"), std::string::npos) << result.output;
   EXPECT_NE(result.errors.find("plane 0,5,0,0,1,0: parts nothing"), std::string::npos) << result.errors;
   EXPECT_NEAR(stats()["volume_sum"], 8, 1e-12);
+  // An expression that is negative, or positive, all over the model.
+  for (const std::string geometry : {"exact", "exact --kerf 0.1", "levelset"})
+    for (const auto& [expression, code] : {std::pair{"=-1 - length(P)", "-"}, {"=1 + length(P)", "+"}}) {
+      const ProgramResult missed =
+          cut(box() + " --resolution 32 --knife '" + expression + "' --geometry " + geometry);
+      EXPECT_NE(missed.errors.find("parts nothing"), std::string::npos) << missed.errors;
+      ASSERT_EQ(stats()["pieces"].size(), 1u) << geometry;
+      EXPECT_EQ(stats()["pieces"][0]["code"], code) << geometry;
+    }
   // Exactly on a face is a miss, too, from either side.
   for (const std::string plane : {"0,1,0,0,1,0", "0,1,0,0,-1,0", "-1,0,0,1,0,0"}) {
     cut(box() + " --plane " + plane);

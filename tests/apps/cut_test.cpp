@@ -119,6 +119,21 @@ TEST_F(CutVerb, PiecesMayBeCutAgainInTheirOwnFolder) {
                                       "pieces.json", "pieces.mtl", "pieces.obj"}));
 }
 
+TEST_F(CutVerb, PlyPiecesCutAgainKeepTheContactsOfTheEarlierCut) {
+  cut(box() + " --plane 0,0,0,0,1,0 --format ply");
+  fs::rename(file("out"), file("first"));
+  cut(file("first") + " --plane 0,3,0,0,1,0 --format ply");
+  ASSERT_EQ(list()["pieces"][0]["neighbours"].size(), 1u);
+  EXPECT_NEAR(list()["pieces"][0]["neighbours"][0]["area"], 4, 1e-9);
+}
+
+TEST_F(CutVerb, PiecesAreWrappedWhereThatIsAskedFor) {
+  cut(box() + " --plane 0,0,0,0,1,0");
+  fs::rename(file("out"), file("first"));
+  const ProgramResult result = cut(file("first") + " --plane 0,3,0,0,1,0 --repair wrap");
+  EXPECT_NE(result.errors.find("piece_0001: wrapped"), std::string::npos) << result.errors;
+}
+
 TEST_F(CutVerb, CutsTheMeshesOfAFolderWithoutAList) {
   fs::create_directory(file("models"));
   meshFile("models/left.ply", boxMesh({-2, 0, 0}, {-1, 1, 1}));

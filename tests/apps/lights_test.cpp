@@ -57,8 +57,11 @@ TEST_F(LightOptions, ASkyThatIsNotGivenIsClear) {
 TEST_F(LightOptions, AClearSkyStandsBehindPreviewsUnlessToldNotTo) {
   const std::string preview = "--preview " + file("a.png");
   EXPECT_TRUE(picture(preview).find("backdrop.R"));
-  for (const std::string& options : {std::string(), preview + " --no-backdrop",
-                                     preview + " --background 0,0,0", preview + " --sky 0.1,0.1,0.2"})
+  std::ofstream(data_->file("off.toml")) << "backdrop = false\n";
+  EXPECT_TRUE(picture(preview + " --backdrop --config " + file("off.toml")).find("backdrop.R"));
+  for (const std::string& options :
+       {std::string(), preview + " --no-backdrop", preview + " --config " + file("off.toml"),
+        preview + " --background 0,0,0", preview + " --sky 0.1,0.1,0.2"})
     EXPECT_FALSE(picture(options).find("backdrop.R")) << options;
 }
 

@@ -16,6 +16,7 @@
 #include <sstream>
 #include <thread>
 
+#include "nephele/render/image/exr_io.h"
 #include "tests/support/run_program.h"
 
 namespace nephele {
@@ -206,7 +207,43 @@ TEST(LookVerb, IsForItsOwnPageOnly) {
   EXPECT_EQ(client.Post((viewer.base() + "settings").c_str(), std::string(2 << 20, 'x'), "application/json")
                 ->status,
             413);
+  const auto nested = [](const char* inner) {
+    return "{\"settings\": " + std::string(200000, '[') + inner + std::string(200000, ']') + "}";
+  };
+  for (const std::string& deep : {nested(""), nested("1"), "{\"rows\": " + std::string(400000, '[')})
+    for (const char* name : {"command", "wedge"}) {
+      const auto answer = client.Post((viewer.base() + name).c_str(), deep, "application/json");
+      ASSERT_TRUE(answer) << viewer.ending();
+      EXPECT_EQ(answer->status, 422);
+      EXPECT_NE(answer->body.find("nests more than 32 deep"), std::string::npos) << answer->body;
+    }
+  const auto nameless = client.Get((viewer.base() + "stream?page=a/b").c_str());
+  EXPECT_EQ(nameless->status, 422);
+  EXPECT_NE(nameless->body.find("page: must be letters and digits"), std::string::npos) << nameless->body;
   EXPECT_EQ(viewer.ending(), "");
+}
+
+TEST(LookVerb, TakesSettingsThatCommandLinesTake) {
+  const Viewer viewer(small());
+  const std::pair<Json, Json> cases[]{{{{"-o", "x"}}, Json::object()},
+                                      {{{"help", true}}, Json::object()},
+                                      {Json::object(), {{"help-all", true}}},
+                                      {Json::object(), {{"size", "4x4"}}},
+                                      {Json::object(), {{"config", "x.toml"}}}};
+  for (const auto& [cloud, render] : cases) {
+    const auto answer = viewer.post("settings", settings(1, cloud, render));
+    EXPECT_EQ(answer->status, 422) << cloud << render;
+    EXPECT_EQ(answer->body.find("called with"), std::string::npos) << answer->body;
+  }
+  Json body = settings(1);
+  body["settings"]["parameters"] = {{"size", "1"}};
+  EXPECT_EQ(viewer.post("settings", body)->status, 422) << "there is no script";
+  Json light = settings(1);
+  light["show"] = {{"what", "cloud"}, {"layer", "light_nix"}};
+  const auto all = viewer.messages(
+      "a", [&] { EXPECT_EQ(viewer.post("settings", light)->status, 200); }, isFinal);
+  ASSERT_FALSE(all.empty());
+  EXPECT_EQ(all.back()["message"], "layer: got 'light_nix', and no light has this name");
 }
 
 TEST(LookVerb, LetsNoPageWriteByAnOption) {
@@ -321,7 +358,7 @@ TEST(LookVerb, WritesWhereItIsToldAndNowhereElse) {
       [](const Json& message) { return message["type"] == "job" && message["state"] != "running"; });
   ASSERT_FALSE(all.empty());
   EXPECT_EQ(all.back()["state"], "done") << all.back();
-  EXPECT_TRUE(std::filesystem::exists(folder.file("picture.exr")));
+  EXPECT_TRUE(readImage(folder.file("picture.exr")).find("backdrop.R"));
   EXPECT_EQ(folder.entryCount(), 1u);
 }
 
@@ -333,6 +370,40 @@ Json endOfJob(const Viewer& viewer, const std::string& what, const std::string& 
       "a", [&] { EXPECT_EQ(viewer.post("job", body)->status, 200); },
       [](const Json& message) { return message["type"] == "job" && message["state"] != "running"; });
   return all.empty() ? Json() : all.back();
+}
+
+TEST(LookVerb, SaysWhyAnExportFailed) {
+  const test::TemporaryFolder folder;
+  std::vector<std::string> arguments = small();
+  arguments.insert(arguments.end(), {"--folder", folder.file("")});
+  const Viewer viewer(arguments);
+  // Of use, and followed by a hint.
+  const Json narrow =
+      endOfJob(viewer, "exr", "a.exr", settings(1, Json::object(), {{"orthographic-width", "4"}}));
+  EXPECT_EQ(narrow["state"], "failed");
+  EXPECT_EQ(narrow["message"], "--orthographic-width: is for --projection orthographic alone");
+  std::filesystem::create_directory(folder.file("a.vdb"));
+  const Json blocked = endOfJob(viewer, "vdb", "a.vdb", settings(1));
+  EXPECT_EQ(blocked["state"], "failed");
+  EXPECT_EQ(blocked["message"], "cannot write " + folder.file("a.vdb") + ": it is a folder");
+}
+
+TEST(LookVerb, KeepsWhatItLooksAt) {
+  const test::TemporaryFolder folder;
+  const std::string input = folder.file("a.vdb");
+  ASSERT_EQ(
+      test::runProgram("levelset " + test::ownData("data/sphere_uv.obj") + " --resolution 12 -o " + input)
+          .exitCode,
+      0);
+  const std::string before = test::textOf(input);
+  const Viewer viewer({input, "--resolution", "12", "--layers", "0", "--folder", folder.file("")});
+  Json body = settings(1, {{"resolution", "12"}, {"layers", "0"}});
+  body.update({{"what", "vdb"}, {"file", "a.vdb"}});
+  const auto answer = viewer.post("job", body);
+  EXPECT_EQ(answer->status, 422);
+  EXPECT_NE(answer->body.find("'a.vdb' is what is looked at"), std::string::npos) << answer->body;
+  EXPECT_EQ(endOfJob(viewer, "vdb", "b.vdb", body)["state"], "done");
+  EXPECT_EQ(test::textOf(input), before);
 }
 
 TEST(LookVerb, WritesWholePicturesAndTurntables) {
@@ -577,17 +648,34 @@ TEST(LookVerb, GivesTheLookBackAsCommandLinesAndAsAFile) {
   EXPECT_EQ(made.exitCode, 0) << made.errors;
 }
 
+TEST(LookVerb, GivesBackACloudOfItsOwn) {
+  const test::TemporaryFolder folder;
+  const Viewer viewer({"--resolution", "24", "--layers", "1"});
+  const Json body = settings(1, {{"resolution", "24"}, {"layers", "1"}}, {{"backdrop", false}});
+  const std::string text = Json::parse(viewer.post("recipe", body)->body)["text"];
+  EXPECT_NE(text.find("species = \"mediocris\"\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("backdrop = false\n"), std::string::npos) << text;
+  std::ofstream(folder.file("look.toml")) << text;
+  const auto made =
+      test::runProgram("cloud -o " + folder.file("a.vdb") + " --config " + folder.file("look.toml"));
+  EXPECT_EQ(made.exitCode, 0) << made.errors;
+}
+
 TEST(LookVerb, PutsParametersIntoTheirPlaceInAScript) {
   const test::TemporaryFolder folder;
-  std::ofstream(folder.file("s.felt")) << "param float size = 0.5 in [0.1, 2] \"of the ball\";\nscalarfield "
-                                          "density = clamp(sphere((0, 0, 0), size) * 20, 0, 1);\n";
+  std::ofstream(folder.file("s.felt")) << "param float size = 0.5 in [0.1, 2] \"of the ball\";\n"
+                                          "param string kind = \"perlin\" in [\"perlin\", \"worley\"];\n"
+                                          "scalarfield density = clamp((sphere((0, 0, 0), size) + 0.1 * "
+                                          "noise(kind, frequency = 3)) * 20, 0, 1);\n";
   const Viewer viewer({folder.file("s.felt")});
   const Json controls = Json::parse(viewer.client().Get((viewer.base() + "controls").c_str())->body);
-  ASSERT_EQ(controls["parameters"].size(), 1u) << controls.dump();
+  ASSERT_EQ(controls["parameters"].size(), 2u) << controls.dump();
   EXPECT_EQ(controls["parameters"][0]["high"], 2);
   Json body = settings(1);
-  body["settings"]["parameters"]["size"] = "0.75";
+  body["settings"]["parameters"] = {{"size", "0.75"}, {"kind", "worley"}};
   const Json recipe = Json::parse(viewer.post("recipe", body)->body);
+  EXPECT_NE(recipe["text"].get<std::string>().find("param string kind = \"worley\" in"), std::string::npos)
+      << recipe;
   EXPECT_NE(recipe["text"].get<std::string>().find("param float size = 0.75 in [0.1, 2]"), std::string::npos)
       << recipe;
   const auto all = viewer.messages(
@@ -620,6 +708,13 @@ TEST(LookVerb, RefusesWhatItCannotLookAt) {
   EXPECT_EQ(test::runProgram("look --no-browser --amplitude=-1").exitCode, 2);
   EXPECT_EQ(test::runProgram("look --no-browser --amplitud=1").exitCode, 2);
   EXPECT_EQ(test::runProgram("look --no-browser --port 0").exitCode, 2);
+  const auto flag = test::runProgram("look --no-browser --half=false");
+  EXPECT_EQ(flag.exitCode, 2);
+  EXPECT_NE(flag.errors.find("--half: got 'false', allowed: no value; it is a flag"), std::string::npos)
+      << flag.errors;
+  const auto host = test::runProgram("look --no-browser --host nowhere.invalid");
+  EXPECT_EQ(host.exitCode, 1);
+  EXPECT_NE(host.errors.find("--host: got 'nowhere.invalid'"), std::string::npos) << host.errors;
   EXPECT_EQ(test::runProgram("look --no-browser --folder /nonexistent").exitCode, 1);
   const std::string mesh = test::ownData("data/cloud_base.obj");
   EXPECT_EQ(test::runProgram("look --no-browser --show pieces").exitCode, 2);

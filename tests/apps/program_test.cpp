@@ -350,7 +350,6 @@ TEST(Program, NamesOfFilesAreNotEmpty) {
   for (const auto& [arguments, option] :
        {std::pair{"levelset " + kMesh + out + " --stats ''", "--stats"},
         {"levelset ''" + out, "input"},
-        {"levelset " + kMesh + out + " --contact-sheet ''", "--contact-sheet"},
         {"cut " + kMesh + " -o " + folder.file("a") + " --knife ''", "--knife"},
         {"cloud " + kMesh + out + " --cache ''", "--cache"},
         {"render x.vdb -o " + folder.file("a.exr") + " --holdout ''", "--holdout"}}) {

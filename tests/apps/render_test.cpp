@@ -235,7 +235,9 @@ TEST_F(RenderVerb, RefusesWrongUseWithTheOptionAndWhatIsAllowed) {
                {"--point 1,2,3,-4", "--point"},
                {"--look-at 0,0,0", "--look-at"},
                {"--preview a.jpg", "--preview"},
-               {"--exposure x", "--exposure"}};
+               {"--exposure x", "--exposure"},
+               {"--set x=1", "--set: is for scripts"},
+               {"--velocity-scale 2", "--velocity-scale: multiplies a velocity grid"}};
   for (const auto& c : cases) {
     const ProgramResult result = runProgram(start + c.arguments);
     EXPECT_EQ(result.exitCode, 2) << c.arguments << ": " << result.errors;
@@ -392,6 +394,7 @@ TEST_F(RenderVerb, RefusesCamerasThatCannotBe) {
       {"--crop 0,0,9,5", 2, "0,0,8,6"},
       {"--projection fisheye", 2, "--projection"},
       {"--orthographic-width 0", 2, "--orthographic-width"},
+      {"--orthographic-width 4", 2, "--orthographic-width: is for --projection orthographic"},
       {"--focal-length 50 --fov 30", 2, "--fov"},
       {"--focal-length 0", 2, "--focal-length"},
       {"--film-width -3", 2, "--film-width"},

@@ -186,6 +186,7 @@ TEST(RenderShapes, RefusesWhatShowsBesideAVolumeOnly) {
         << result.errors;
   }
   EXPECT_EQ(runProgram(start + "--aov none").exitCode, 0);
+  EXPECT_EQ(runProgram(start + "--set x=1").exitCode, 2);
 }
 
 TEST(RenderBadInput, IsNamedBesideOtherVolumes) {

@@ -122,6 +122,36 @@ TEST_F(Sequences, NameWhatIsMissingBeforeAnyWork) {
   EXPECT_TRUE(fs::exists(path("f", 3, "exr")));
 }
 
+TEST_F(Sequences, NameMasksThatAreMissing) {
+  for (const std::string& density :
+       {"mask:" + folder.file("ball.#.vdb") + ":0,1", "mask:" + folder.file("ball.$F.vdb") + ":density:0,1",
+        "=mask(\"" + folder.file("ball.%d.vdb") + "\")"}) {
+    fs::copy_file(path("ball", 1, "vdb"), folder.file("ball.1.vdb"), fs::copy_options::skip_existing);
+    fails("cloud " + ownData("data/sphere_uv.obj") + " --resolution 24 --layers 1 -o " + pattern("c", "vdb") +
+              " --frames 1-3 --density '" + density + "'",
+          1, "vdb: 2 of 3 frames are missing: 2-3");
+  }
+  EXPECT_FALSE(fs::exists(path("c", 1, "vdb")));
+}
+
+// Of all calls: one that only a later one would write.
+TEST_F(Sequences, RefuseOutputsThatAreTheSameFile) {
+  const std::string cloud = "cloud " + ownData("data/sphere_uv.obj") + " --resolution 24 --layers 1 -o '";
+  fails(cloud + folder.file("a.#.vdb") + "' --surface '" + folder.file("a.##.vdb") + "' --frames 8-11", 2,
+        "--surface: got");
+  fails(cloud + folder.file("a.#.vdb") + "' --surface '" + folder.file("a.1#.vdb") + "' --frames 1-11", 2,
+        "no other of the calls");
+  fails(rendering("--frames 1-3 --contact-sheet '" + path("f", 2, "png") + "'"), 2, "no other of the calls");
+  EXPECT_FALSE(fs::exists(folder.file("a.8.vdb")) || fs::exists(path("f", 1, "exr")));
+}
+
+TEST_F(Sequences, OfWhichOneFailsAreNotDoneForFarms) {
+  writeBall(2, 1, 1, "other");
+  const ProgramResult result = runProgram(rendering("--frames 1-3 --progress alf"));
+  EXPECT_EQ(result.exitCode, 1);
+  EXPECT_EQ(result.output.find("100%"), std::string::npos) << result.output;
+}
+
 TEST_F(Sequences, RefuseFramesOfOtherGrids) {
   writeBall(2, 0.5f, 1, "smoke");
   fails(rendering("--frames 1-3"), 1, "its grids are 'smoke'");
@@ -313,6 +343,8 @@ TEST_F(Sequences, AreRefusedInWords) {
   fails("render " + balls + " -o '" + folder.file("f.#.##.exr") + "' --frames 1", 2, "2 places");
   fails(rendering("--frames 1-3 --projection orthographic --camera '" + ownData("data/none.chan") + "'"), 1,
         "none.chan");
+  fails(rendering("--frames 1-3 --aov none,Z"), 2, "--aov: got 'none'");
+  fails(rendering("--frames 1-3 --contact-sheet '" + folder.file("c.jpg") + "'"), 2, ".png");
   // A name may hold such a sign where there are no frames.
   fs::copy_file(path("ball", 1, "vdb"), folder.file("ball#1.vdb"));
   succeeds("info '" + folder.file("ball#1.vdb") + "'");

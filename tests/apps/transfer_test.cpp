@@ -257,6 +257,27 @@ TEST_F(TransferVerb, BakesATextureForTheObjectsOwnCoordinates) {
   EXPECT_NEAR(linear(baked.at("R", 2, 2)), 0.5, 0.01);
 }
 
+TEST_F(TransferVerb, SaysWhatABakedPngCannotHold) {
+  Image bright;
+  bright.width = bright.height = 8;
+  for (const char* name : {"R", "G", "B"}) bright.add(name);
+  for (Image::Channel& channel : bright.channels) std::ranges::fill(channel.values, 2.0f);
+  writeExr(file("bright.exr"), bright, ImageCamera{});
+  const std::string bake =
+      withStats("out.obj") + "--method closest --bake-texture " + file("baked.png") + " --texture ";
+  const ProgramResult result = transfer(sphere_, sphere_, bake + file("bright.exr"));
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_NE(result.errors.find("64 of 64 texels are brighter than 1"), std::string::npos) << result.errors;
+  EXPECT_EQ(transfer(sphere_, sphere_, bake + ramp(8, 8)).errors.find("brighter"), std::string::npos);
+}
+
+TEST_F(TransferVerb, PaintsDistortionWithoutTextureCoordinates) {
+  const std::string plain = written("plain.obj", icosphere(1, 1));
+  const ProgramResult result = transfer(
+      plain, plain, "--method closest --size 32x16 --preview-paint distortion --preview " + file("p.png"));
+  EXPECT_EQ(result.exitCode, 0) << result.errors;
+}
+
 TEST_F(TransferVerb, MakesAPreview) {
   const std::string ball = written("ball.obj", icosphere(1, 2));
   const std::string preview = "--method closest --preview " + file("p.png") + " --size 160x80 ";
@@ -266,6 +287,7 @@ TEST_F(TransferVerb, MakesAPreview) {
     const Image image = readImage(file("p.png"));
     EXPECT_EQ(image.width, 160);
     EXPECT_EQ(image.height, 80);
+    EXPECT_EQ(double(stats()["unconverged_fraction"]), 1);
     // Both halves show their ball before the backdrop.
     for (const int x : {45, 115}) EXPECT_NE(image.at("R", x, 40), image.at("B", x, 40)) << more;
   }
@@ -288,6 +310,8 @@ TEST_F(TransferVerb, CarriesColoursAndNumbersOfVertices) {
     EXPECT_NEAR(attributeOf(out, "mass").values[v], 3 * out.positions[v].y, 1e-4);
     EXPECT_NEAR(attributeOf(out, "color").values[3 * v], 0.5 + 0.5 * out.positions[v].x, 3.0 / 255);
   }
+  ASSERT_EQ(transfer(from, to, "-o " + file("OUT.PLY")).exitCode, 0);
+  EXPECT_EQ(attributeOf(readMesh(file("OUT.PLY")), "mass").values.size(), out.positions.size());
   // An OBJ holds the colours only, and says so.
   const ProgramResult obj = transfer(from, to, withStats("out.obj") + "--align none");
   ASSERT_EQ(obj.exitCode, 0) << obj.errors;
@@ -410,12 +434,18 @@ TEST_F(TransferVerb, TakesShapesThatAreOpenInsideOutFarAwayOrHuge) {
 
 TEST_F(TransferVerb, RefusesFilesThatLackWhatIsAskedFor) {
   const std::string plain = written("plain.obj", icosphere(1, 1)), picture = ramp(4, 4);
+  Mesh cap = icosphere(1, 1);
+  cap.corners.resize(60);
+  cap.faceStart.resize(21);
+  const std::string open = written("open.obj", cap), warped = " --warped-mesh " + file("w.obj");
   std::ofstream(file("empty.png"));
   const std::vector<std::array<std::string, 3>> cases{
       {plain, sphere_, "has no attributes"},
       {sphere_ + " --attributes paint", plain, "has no attribute 'paint'; it has uv"},
       {plain + " --preview " + file("p.png"), sphere_, "which --preview needs"},
       {plain + " --texture " + picture, sphere_, "which --texture needs"},
+      {sphere_ + warped, open, "open.obj: is not closed, and --warped-mesh needs"},
+      {open + warped, sphere_, "open.obj: is not closed, and --warped-mesh needs"},
       {sphere_ + " --texture /nowhere/t.png", plain, "/nowhere/t.png"},
       {sphere_ + " --texture " + file("empty.png"), plain, "empty.png"},
       {sphere_ + " --texture " + picture + " --bake-texture " + file("b.png"), plain,
@@ -437,11 +467,28 @@ TEST_F(TransferVerb, RefusesFilesThatLackWhatIsAskedFor) {
 }
 
 TEST_F(TransferVerb, BadOptionsAreUsageErrorsThatNameThem) {
-  for (const std::string bad :
-       {"--method fast", "--align maybe", "--quality ok", "--iterations 0", "--iterations 21", "--order 3",
-        "--resolution 1", "--warp w.obj", "--warped-mesh w.vdb", "--bake-texture b.png", "--preview p.jpg",
-        "--checker 3", "--attributes uv,,color", "--texture t.png --bake-texture b.png --bake-size 5",
-        "--preview p.png --size 0x5", "--preview p.png --view 1", "--bake-samples 2"}) {
+  for (const std::string bad : {"--method fast",
+                                "--align maybe",
+                                "--quality ok",
+                                "--iterations 0",
+                                "--iterations 21",
+                                "--order 3",
+                                "--resolution 1",
+                                "--warp w.obj",
+                                "--warped-mesh w.vdb",
+                                "--bake-texture b.png",
+                                "--preview p.jpg",
+                                "--checker 3",
+                                "--attributes uv,,color",
+                                "--texture t.png --bake-texture b.png --bake-size 5",
+                                "--preview p.png --size 0x5",
+                                "--preview p.png --view 1",
+                                "--bake-samples 2",
+                                "--method closest --warped-mesh w.obj",
+                                "--method closest --align similarity",
+                                "--method closest --quality best",
+                                "--method closest --iterations 4",
+                                "--method closest --order 2"}) {
     const ProgramResult result = transfer(sphere_, sphere_, "-o " + file("out.obj") + " " + bad);
     EXPECT_EQ(result.exitCode, 2) << bad << ": " << result.errors;
     const std::string option = bad.substr(bad.rfind("--"), bad.find(' ', bad.rfind("--")) - bad.rfind("--"));

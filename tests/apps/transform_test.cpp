@@ -92,6 +92,22 @@ TEST_F(TransformVerb, PlacesVolumesByWhatTheyShow) {
   }
 }
 
+// Beside 1e16, doubles lie 2 apart.
+TEST_F(TransformVerb, RefusesPlacesWhereVoxelsAreNothing) {
+  writeVdbFile(file("a.vdb"),
+               {toVdb(*bakeGrid(sphere({}, 0.5f), {.voxelSize = 0.1f, .box = {{-1, -1, -1}, {1, 1, 1}}}),
+                      {"density"})},
+               {});
+  for (const char* far : {"1e16,0,0", "0,-1e30,0"}) {
+    const ProgramResult result =
+        runProgram("transform " + file("a.vdb") + " -o " + file("b.vdb") + " --move " + far);
+    EXPECT_EQ(result.exitCode, 1) << far;
+    EXPECT_NE(result.errors.find("a.vdb: grid 'density' would be 1e+"), std::string::npos) << result.errors;
+  }
+  run(file("a.vdb") + " -o " + file("b.vdb") + " --move 1e10,0,0");
+  EXPECT_NEAR(describe(readVdbFile(file("b.vdb"))[0]).voxelSize.x, 0.1, 1e-4);
+}
+
 TEST_F(TransformVerb, RefusesWhatDoesNotFit) {
   std::ofstream(file("a.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const struct {

@@ -123,6 +123,9 @@ TEST_F(TurntableVerb, SkipsOnlyWhatWasMadeWithTheSameOptionsOfTheSameInput) {
   EXPECT_EQ(skipped("--frames 1-3 --only 2"), 1);
   EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 0);
   EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 3);
+  // The picture of another frame.
+  fs::copy_file(frame(3), frame(2), fs::copy_options::overwrite_existing);
+  EXPECT_EQ(skipped("--frames 1-3 --sun 10,20"), 2);
   // A turn of other frames has them elsewhere.
   EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 0);
   EXPECT_EQ(skipped("--frames 1-4 --only 1-3 --sun 10,20"), 3);

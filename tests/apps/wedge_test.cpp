@@ -107,6 +107,24 @@ TEST_F(Wedges, TakeRangesListsVectorsWordsAndFlags) {
   EXPECT_EQ(names("look=sunset,storm"), (Names{"look sunset", "look storm"}));
 }
 
+TEST_F(Wedges, AreTakenFromFiles) {
+  const std::string config = " --config '" + file("c.toml") + "' ";
+  std::ofstream(file("c.toml")) << "wedge = \"seed=1-3\"\nhalf = true\n[render]\nwedge = \"fov=20,30\"\n";
+  succeeds(cloud(config));
+  EXPECT_EQ(wedge().size(), 3u);
+  // What is typed wins, and what is kept is the same wherever the wedge stands.
+  const ProgramResult typed = succeeds(cloud(config + "--wedge seed=2-4 --skip-existing"));
+  EXPECT_NE(typed.errors.find("2 of 3 calls were there"), std::string::npos) << typed.errors;
+  EXPECT_TRUE(fs::exists(file("c.seed_4.vdb")));
+}
+
+TEST_F(Wedges, SwitchFlagsOffThatAFileSets) {
+  std::ofstream(file("c.toml")) << "half = true\n";
+  succeeds(cloud("--wedge half=true,false --config '" + file("c.toml") + "'"));
+  EXPECT_TRUE(describe(readScalarGrid(file("c.half_true.vdb"))).halfFloat);
+  EXPECT_FALSE(describe(readScalarGrid(file("c.half_false.vdb"))).halfFloat);
+}
+
 TEST_F(Wedges, OfValuesThatDifferOnlyInSignsHaveNamesOfTheirOwn) {
   std::string values;
   for (const char* name : {"a b.toml", "a,b.toml", "a_b.toml"}) {
@@ -261,6 +279,13 @@ TEST_F(Wedges, AreRefusedInWordsBeforeAnyWork) {
   refuses(cloud("--wedge seeds=1-3"), "did you mean 'seed'?");
   refuses(cloud("--wedge output=a.vdb,b.vdb"), "not an option that a wedge can vary");
   refuses(cloud("--wedge threads"), "OPTION=VALUES");
+  for (const char* how : {"threads=1,2", "memory-limit=1G,2G", "display-server=a,b"})
+    refuses(rendering("--wedge " + std::string(how)), "not an option that a wedge can vary");
+  refuses(rendering("--wedge 'crop=0,0,10,10;0,0,20,20' --contact-sheet '" + file("t.png") + "'"),
+          "shows pictures of one size");
+  refuses(rendering("--wedge fov=20,30 --contact-sheet '" + file("r.fov_30.png") + "'"),
+          "no other of the calls");
+  refuses(cloud("--wedge seed=1,2").replace(cloud("").find("c.vdb"), 5, "c.##.a.##.vdb"), "one place");
   refuses(cloud("--wedge seed="), "OPTION=VALUES");
   refuses(cloud("--wedge seed=1,,2"), "OPTION=VALUES");
   refuses(cloud("--wedge seed=3-1"), "a range that grows");

@@ -27,6 +27,7 @@ export class Settings extends EventTarget {
       own[name] = value;
       for (const other of this.table[verb][name]?.excludes ?? []) delete own[other];
     }
+    if ("projection" in values && own.projection !== "orthographic") delete own["orthographic-width"];
     this.#changed(hurry);
   }
 

@@ -278,6 +278,8 @@ Camera CameraOptions::camera(double framesLater) const {
   if (const auto& c = frame.crop; c && (c->x1 > frame.width || c->y1 > frame.height))
     refuseValue("--crop", fmt::format("{},{},{},{}", c->x0, c->y0, c->x1, c->y1),
                 fmt::format("within the picture, 0,0,{},{}", frame.width, frame.height));
+  if (orthographicWidth && frame.projection != Camera::Projection::orthographic)
+    throw CLI::ValidationError("--orthographic-width", "is for --projection orthographic alone");
   if (!shutter.isInstant() && file.empty() && !volumeMotion && !volumeFlows)
     throw CLI::ValidationError(
         "--shutter",

@@ -148,7 +148,8 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
   if (lit) result.render.surfaces = lit->surfaces();
   result.screen.background =
       background.value_or(result.lights.map ? result.lights.map->mean() : result.lights.sky);
-  std::erase(result.render.aovs, "none");
+  if (std::erase(result.render.aovs, "none") > 0 && !result.render.aovs.empty())
+    refuseValue("--aov", "none", "none alone, or layers without it");
   if (scale.aerialPerspective) {
     if (!result.lights.clear)
       throw CLI::ValidationError("--aerial-perspective", "needs the air of --sky clear");

@@ -20,10 +20,12 @@ void SceneVolume::resample(float voxelSize, const Progress& progress) {
 
 SceneVolume SceneOptions::sceneVolume(PictureOptions& picture, Run& run) const {
   const auto made = [&]() -> SceneVolume {
-    if (!isScript(inputs))
+    if (!isScript(inputs)) {
+      requireNoSettings(script);
       return SceneVolume(readVolumes(
           inputs, picture.volumes,
           {picture.shutter, picture.readsCodes(), objects.any(), picture.time(run), picture.seed}, run));
+    }
     requireNoGrids(picture.volumes);
     ScriptVolume ran(inputs.front(), script, picture, run);
     RenderVolume sampled = ran.forCameraOf(picture, run);

@@ -93,7 +93,8 @@ ScriptScene runScript(const std::string& path, const ScriptOptions& options, con
   parts.emissionScale = float(picture.volumes.emissionScale);
   if (!picture.shutter.isInstant()) {
     parts.velocity = declared.as<VectorField>("velocity", felt::Kind::vectorField);
-    if (parts.velocity) *parts.velocity = *parts.velocity * ScalarField(float(picture.volumes.velocityScale));
+    if (parts.velocity)
+      *parts.velocity = *parts.velocity * ScalarField(float(picture.volumes.velocityFactor()));
     parts.shutter = picture.shutter;
   }
   if (!picture.volumes.densityScales.empty()) parts.share = float(picture.volumes.densityScales[0]);
@@ -132,6 +133,11 @@ void addScriptOptions(CLI::App& app, ScriptOptions& options) {
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void requireNoSettings(const ScriptOptions& options) {
+  if (!options.settings.empty())
+    throw CLI::ValidationError("--set", "is for scripts (.felt), which have parameters");
 }
 
 bool isScript(const std::vector<std::string>& paths) {

@@ -26,6 +26,9 @@ struct ScriptOptions {
 /// Declares --detail and --set on `app`.
 void addScriptOptions(CLI::App& app, ScriptOptions& options);
 
+/// Refuses parameters where nothing is a script. @throws CLI::ValidationError naming the option.
+void requireNoSettings(const ScriptOptions& options);
+
 /// Whether the input is a script: one file, whose name ends with .felt. @throws Error if it is one of
 /// several.
 bool isScript(const std::vector<std::string>& paths);

@@ -52,6 +52,7 @@ bool areShapes(const std::vector<std::string>& paths) {
 
 void writeShapesPicture(const CLI::App& app, const SceneOptions& scene, const PictureOptions& options,
                         const PictureFiles& files, Run& run) {
+  requireNoSettings(scene.script);
   requireNothingOfVolumes(app, options);
   run.begin("read");
   std::vector<SurfaceObject> shapes = scene.objects.shapes(scene.inputs, run.memoryLimitBytes);

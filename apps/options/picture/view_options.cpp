@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdlib>
+#include <optional>
 
 #include "nephele/render/image/config_view.h"
 
@@ -15,25 +16,34 @@ std::string fromEnvironment() {
   return path ? path : "";
 }
 
+std::optional<ViewCurve> curveOf(const std::string& name) {
+  for (const ViewCurve curve : kCurves)
+    if (ViewTransform{.curve = curve}.name() == name) return curve;
+  return std::nullopt;
+}
+
 }  // namespace
 
-ViewTransform ViewOptions::read(ViewCurve otherwise) const {
-  ViewTransform view;
-  view.exposureStops = exposureStops;
-  view.curve = otherwise;
-  if (name.empty() && config.empty()) return view;
-  for (const ViewCurve curve : kCurves) {
-    ViewTransform candidate = view;
-    candidate.curve = curve;
-    if (candidate.name() == name) return candidate;
-  }
+std::string ViewOptions::configuration() const {
+  if ((name.empty() && config.empty()) || curveOf(name)) return "";
   const std::string path = config.empty() ? fromEnvironment() : config;
   if (path.empty())
     refuseValue(
         "--view-transform", name,
         "standard, filmic, agx, raw, or a view of the configuration that --ocio-config or $OCIO names");
-  view.configView = readConfigView(path, name);
-  return view;
+  return path;
+}
+
+ViewTransform ViewOptions::read(ViewCurve otherwise) const {
+  const std::string path = configuration();
+  return {.exposureStops = exposureStops,
+          .curve = curveOf(name).value_or(otherwise),
+          .configView = path.empty() ? nullptr : readConfigView(path, name)};
+}
+
+std::string ViewOptions::identity() const {
+  const std::string path = configuration();
+  return path.empty() ? "" : configViewIdentity(path, name);
 }
 
 void addViewOptions(CLI::App& app, ViewOptions& options) {

@@ -18,6 +18,12 @@ struct ViewOptions {
   /// Reads the configuration where the view is one of it; `otherwise` where none was asked for.
   /// @throws CLI::ValidationError or Error if there is no such view.
   ViewTransform read(ViewCurve otherwise) const;
+  /// Of the view, as configViewIdentity; "" where it is a curve. @throws as `read`.
+  std::string identity() const;
+
+ private:
+  /// That the view is of; "" where it is a curve.
+  std::string configuration() const;
 };
 
 /// Declares --view-transform, --ocio-config and --exposure on `app`.

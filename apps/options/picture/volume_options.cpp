@@ -113,7 +113,7 @@ VolumePart readPart(const std::string& path, std::size_t index, const VolumeOpti
   if (const std::string name = nameIn(options.temperatureGrids); !name.empty())
     part.temperature = readFog(path, name, run);
   if (const std::string name = nameIn(options.velocityGrids); !name.empty() && !reading.shutter.isInstant()) {
-    part.velocity = readThree(path, name, options.velocityScale);
+    part.velocity = readThree(path, name, options.velocityFactor());
     part.shutter = reading.shutter;
   }
   part.emissionScale = float(options.emissionScale);
@@ -126,6 +126,11 @@ void checkCount(const std::string& option, std::size_t given, std::size_t volume
     throw Error(volumes == 1 ? fmt::format("{}: got {} entries for 1 volume, allowed: 1", option, given)
                              : fmt::format("{}: got {} entries for {} volumes, allowed: 1 or {}", option,
                                            given, volumes, volumes));
+}
+
+void requireScaledVelocity(const VolumeOptions& options) {
+  if (options.velocityScale && options.velocityGrids.empty())
+    throw CLI::ValidationError("--velocity-scale", "multiplies a velocity grid; give --velocity-grid");
 }
 
 }  // namespace
@@ -164,8 +169,9 @@ void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
   addGrid("--velocity-grid", options.velocityGrids,
           "Velocities that blur the volume while the --shutter is open: world units per second, 24 frames "
           "in one, unless --velocity-scale says otherwise.");
-  addNumber(app, "--velocity-scale", options.velocityScale, -1e6, 1e6,
-            "Multiplies the velocity grid: frames, to world units per frame.");
+  addOptional(app, "--velocity-scale", options.velocityScale, -1e6, 1e6,
+              "Multiplies the velocity grid: frames, to world units per frame.")
+      ->default_str(fmt::format("{:g}", options.velocityFactor()));
   addNumber(app, "--emission-scale", options.emissionScale, 0, 1e12, "Multiplies all that glows.");
   app.add_option_function<std::string>(
          "--density-scale",
@@ -204,6 +210,7 @@ RenderVolume readVolumes(const std::vector<std::string>& paths, const VolumeOpti
   checkCount("--temperature-grid", options.temperatureGrids.size(), paths.size());
   checkCount("--velocity-grid", options.velocityGrids.size(), paths.size());
   checkCount("--density-scale", options.densityScales.size(), paths.size());
+  requireScaledVelocity(options);
   if (!options.velocityGrids.empty() && reading.shutter.isInstant())
     throw CLI::ValidationError("--velocity-grid", "shows only while the shutter is open; give --shutter");
   run.begin("read");
@@ -230,6 +237,7 @@ RenderVolume volumeOf(const std::function<std::shared_ptr<const BrickGrid>(const
                                  fmt::format("got '{}', and the cloud has one grid, density", names[0]));
     return true;
   };
+  requireScaledVelocity(options);
   VolumePart part;
   isAsked("--grid", options.densityGrids);
   part.share = float(entryOf(options.densityScales, 0, 1.0));

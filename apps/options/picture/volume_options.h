@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,14 +21,15 @@ struct VolumeOptions {
   /// Likewise.
   std::vector<double> densityScales;
   double emissionScale = 1, temperatureScale = 2000;
-  /// Frames per unit of time.
-  double velocityScale = 1.0 / 24;
+  /// Frames per unit of time; a 24th if not given.
+  std::optional<double> velocityScale;
 
   /// Whether anything but densities is looked at.
   bool hasOthers() const {
     return !(color.empty() && colourGrids.empty() && emissionGrids.empty() && temperatureGrids.empty() &&
              velocityGrids.empty());
   }
+  double velocityFactor() const { return velocityScale.value_or(1.0 / 24); }
 };
 
 /// Declares the options on `app`.

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -182,3 +183,15 @@ void PieceFolder::commit() {
 }
 
 }  // namespace nephele::detail
+
+namespace nephele {
+
+bool isListedPiece(const std::string& path) {
+  namespace fs = std::filesystem;
+  const fs::path file = fs::absolute(path), list = file.parent_path() / detail::PieceFolder::kList;
+  std::error_code error;
+  return fs::exists(list, error) &&
+         std::ranges::count(detail::filesListed(list.string()), file.filename().string()) > 0;
+}
+
+}  // namespace nephele

@@ -4,10 +4,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "nephele/levelset/cut/piece_files.h"
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/levelset/io/point_io.h"
+#include "nephele/levelset/mesh/mesh_to_level_set.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_topology.h"
 #include "tests/support/run_program.h"
@@ -54,6 +56,60 @@ TEST(CutParts, ContactsAreFoundAcrossAnEarlierCut) {
   EXPECT_EQ(again.pieces[0].name, "piece_0001_0001");
   EXPECT_EQ(again.pieces[3].name, "piece_0002_0002");
   EXPECT_EQ(again.pieces[3].parent, "piece_0002");
+}
+
+// As of pieces in .ply files.
+TEST(CutParts, ContactsAcrossAnEarlierCutNeedNoGroups) {
+  std::vector<CutPart> parts =
+      partsOf(cutIntoMeshes(std::vector<CutPart>{{.mesh = icosphere(1, 3)}}, {.planes = {kAcrossX}}));
+  double area = 0;
+  for (CutPart& part : parts) {
+    area = innerArea(part.mesh);
+    part.mesh.groups.clear();
+  }
+  const BladePlane farAway{{0, 5, 0}, {0, 1, 0}};
+  for (const BladePlane& plane : {farAway, kAcrossY}) {
+    const Pieces again = cutIntoMeshes(parts, {.planes = {plane}});
+    double across = 0;
+    for (std::size_t p = 0; p < again.pieces.size() / 2; ++p)
+      for (const PieceContact& contact : again.pieces[p].neighbours)
+        if (contact.piece >= again.pieces.size() / 2) across += contact.area;
+    EXPECT_NEAR(across, area, 1e-9);
+  }
+}
+
+TEST(CutParts, LevelSetsHaveContactsAcrossAnEarlierCut) {
+  constexpr float kVoxel = 2.0f / 64;
+  std::vector<CutPart> parts = partsOf(
+      cutIntoMeshes(std::vector<CutPart>{{.mesh = icosphere(1, 4)}}, {.planes = {{{0, 0, 0}, {0, 1, 0}}}}));
+  for (CutPart& part : parts)
+    part.level = toBricks(meshToLevelSet(triangulated(part.mesh), {.voxelSize = double(kVoxel)}));
+  const auto areasOf = [&](const BladePlane& plane, float kerf) {
+    std::map<std::pair<std::string, std::string>, double> areas;
+    const Pieces cut = cutIntoLevelSets(parts, double(kVoxel), {.planes = {plane}}, {.kerf = kerf});
+    for (const Piece& piece : cut.pieces)
+      for (const PieceContact& contact : piece.neighbours)
+        areas[{piece.name, cut.pieces[contact.piece].name}] = contact.area;
+    return areas;
+  };
+  // Too small by about a voxel along the rim: of a half disc, and of a disc.
+  const double half = (M_PI + 2) * double(kVoxel), whole = 2 * M_PI * double(kVoxel);
+  const auto quarters = areasOf(kAcrossX, 0);
+  EXPECT_EQ(quarters.size(), 8u);
+  for (const auto& [names, area] : quarters) EXPECT_NEAR(area, M_PI / 2, half) << names.first << names.second;
+  EXPECT_TRUE(quarters.contains({"piece_0001_0001", "piece_0002_0001"}));
+  // A part that no knife touches has its own large triangles.
+  const auto untouched = areasOf({{0, 0.5f, 0}, {0, 1, 0}}, 0);
+  EXPECT_EQ(untouched.size(), 4u);
+  EXPECT_NEAR(untouched.at({"piece_0001", "piece_0002_0001"}), M_PI, whole);
+  EXPECT_NEAR(areasOf({{0, 5, 0}, {0, 1, 0}}, 0).at({"piece_0001", "piece_0002"}), M_PI, whole);
+  // A kerf takes the contacts of its own cut alone.
+  const auto apart = areasOf(kAcrossX, 0.01f);
+  EXPECT_EQ(apart.size(), 4u);
+  EXPECT_TRUE(apart.contains({"piece_0001_0001", "piece_0002_0001"}));
+  EXPECT_THROW(cutIntoLevelSets(parts, double(kVoxel),
+                                {.cells = {{-1, 0, 0}, {1, 0, 0}}, .cellRoughness = {.amplitude = 0.01f}}),
+               Error);
 }
 
 TEST(CutParts, PartsThatNoKnifeTouchesStayAsTheyAre) {
@@ -140,7 +196,8 @@ TEST(Points, AreReadFromText) {
   EXPECT_EQ(titled.attributes[1].values, (std::vector<float>{0.5f, 0.25f}));
   EXPECT_EQ(titled.attributes[2].name, "vx");
   for (const char* bad : {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n",
-                          "", "1,,2,3\n", "1 2 nan\n1 2 3\n", "x,y,z,w\n1,2\n"}) {
+                          "", "1,,2,3\n", "1 2 nan\n1 2 3\n", "nan 0 0\n1 1 1\n", "-inf,0,0\n1,1,1\n",
+                          "x 1e999 z\n1 1 1\n", "x,y,z,w\n1,2\n"}) {
     std::ofstream(folder.file("bad.txt")) << bad;
     EXPECT_THROW(readPoints(folder.file("bad.txt")), Error) << bad;
   }

@@ -88,7 +88,7 @@ TEST(MeshIo, ColoursAndTextureCoordinatesThatAreNotFiniteAreNotWrittenAsText) {
   writeMesh(folder.file("b.ply"), mass);
   EXPECT_TRUE(std::isnan(find(readMesh(folder.file("b.ply")), "mass")->values[1]));
   writeMesh(folder.file("c.ply"), color);
-  EXPECT_EQ(find(readMesh(folder.file("c.ply")), "color")->values[3 * 4], 0.0f) << "bytes hold 0 to 1";
+  EXPECT_EQ(find(readMesh(folder.file("c.ply")), "color")->values[3 * 4], -inf);
   writeMesh(folder.file("a.stl"), uv);
   EXPECT_NO_THROW(readMesh(folder.file("a.stl")));
 }
@@ -143,6 +143,19 @@ TEST(MeshIo, PlyRoundTripKeepsPolygonsAttributesAndDigits) {
   EXPECT_EQ(find(back, "uv")->values, mesh.attributes[0].values);
   EXPECT_EQ(find(back, "color")->values, mesh.attributes[1].values) << "multiples of 1/255 survive";
   EXPECT_EQ(find(back, "mass")->values, mesh.attributes[2].values);
+}
+
+TEST(MeshIo, PlyHasColoursAsBytesWhereBytesHoldThem) {
+  const TemporaryFolder folder;
+  Mesh bytes = decorated(), floats = decorated();
+  for (std::size_t i = 0; i < 15; ++i) bytes.attributes[1].values[i] = float(17 * i) / 255;
+  floats.attributes[1].values = {0.5f, 2.5f, -1, 0.1f, 1e-9f, 1e9f, 0, 0, 0, 1, 1, 1, 0.3f, 0.7f, 1.0001f};
+  for (const auto& [mesh, type] : {std::pair{&bytes, "uchar"}, {&floats, "float"}}) {
+    writeMesh(folder.file("a.ply"), *mesh);
+    EXPECT_NE(test::textOf(folder.file("a.ply")).find(std::string("property ") + type + " red\n"),
+              std::string::npos);
+    EXPECT_EQ(find(readMesh(folder.file("a.ply")), "color")->values, mesh->attributes[1].values) << type;
+  }
 }
 
 // Corner c has 10 c, 10 c + 1, ... per attribute, which no two corners share.
