@@ -26,9 +26,7 @@ constexpr std::string_view kHow[]{"config",       "look",           "skip-existi
                                   "progress",     "overwrite",      "help"};
 
 std::string extensionOf(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return extension;
+  return CLI::detail::to_lower(std::filesystem::path(path).extension().string());
 }
 
 std::string digestOfPicture(const std::string& path) {

@@ -82,7 +82,8 @@ std::vector<std::string> outputsOf(const CLI::App& app) {
 }
 
 void requireOwnFile(const std::string& option, const std::string& path, std::set<std::string>& known) {
-  if (!known.insert(fileOf(path).string()).second)
+  const fs::path file = fileOf(path);
+  if (!file.empty() && !known.insert(file.string()).second)
     refuseValue(option, path, "a file that no other of the calls writes");
 }
 
