@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/app.h"
+#include "apps/options/outputs.h"
 #include "apps/options/picture/view_options.h"
 #include "nephele/levelset/cut/piece_files.h"
 #include "nephele/levelset/io/mesh_io.h"
@@ -44,10 +45,6 @@ std::string digestOfPicture(const std::string& path) {
 std::string digestOfVolume(const std::string& path) {
   const std::vector<VdbGrid> grids = readVdbFile(path);
   return grids.empty() ? "" : metadataOf(grids.front(), kPartDigest).value_or("");
-}
-
-std::string textOf(const CLI::App& app, const std::string& option) {
-  return app.count(option) > 0 ? app.get_option(option)->results().front() : "";
 }
 
 /// That its list of pieces has.
@@ -99,8 +96,9 @@ std::string optionsDigest(const CLI::App& app, std::span<const std::string_view>
     }
   }
   if (app.get_option_no_throw("--ocio-config") && std::ranges::count(others, "view-transform") == 0)
-    hash.add(ViewOptions{.name = textOf(app, "--view-transform"), .config = textOf(app, "--ocio-config")}
-                 .identity());
+    hash.add(
+        ViewOptions{.name = givenValue(app, "--view-transform"), .config = givenValue(app, "--ocio-config")}
+            .identity());
   return hash.text();
 }
 

@@ -8,6 +8,7 @@
 
 #include "apps/file_hashes.h"
 #include "apps/options/config_file.h"
+#include "apps/options/outputs.h"
 #include "nephele/levelset/io/output_file.h"
 #include "nephele/levelset/io/vdb_io.h"
 #include "nephele/modeling/base/error.h"
@@ -200,8 +201,7 @@ std::vector<std::pair<std::string, std::function<std::string(std::size_t)>>> Seq
     if (!isOutputOfCall(*option)) continue;
     for (const std::string& value : option->results())
       if (const Word* word = wordOf(value)) {
-        const bool isNamed = option->get_type_name().starts_with("[NAME=]");
-        const std::size_t length = value.size() - (isNamed ? value.find('=') + 1 : 0);
+        const std::size_t length = pathOf(*option, value).size();
         const File file{word, word->pattern.path(range_.frames().front()).size() - length, 0};
         result.emplace_back(option->get_name(false, true),
                             [this, file](std::size_t i) { return file.path(range_.frames()[i]); });

@@ -99,7 +99,7 @@ void refuseValueOfFlag(const CLI::App& app, const std::string& argument) {
 void refuseRepeated(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     if (const std::size_t times = option->results().size();
-        times > std::size_t(option->get_items_expected_max()))
+        times > std::size_t(std::max(1, option->get_items_expected_max())))
       throw CLI::ValidationError(option->get_name(), fmt::format("is given {} times, allowed: once", times));
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "apps/options/outputs.h"
 #include "apps/options_digest.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/render/session/picture_stages.h"
@@ -42,11 +43,6 @@ std::vector<Extent> measured(const Verb& verb, const SeveralCalls& calls, Progra
 nlohmann::json described(const Extent& range) {
   const auto corner = [](const Vec3f& p) { return nlohmann::json{p.x, p.y, p.z}; };
   return {{"box", {corner(range.box.min), corner(range.box.max)}}, {"longest_side", range.longestSide}};
-}
-
-std::string valueOf(const CLI::App& app, const std::string& name) {
-  const CLI::Option* option = app.get_option_no_throw(name);
-  return option && option->count() > 0 ? option->results().front() : "";
 }
 
 bool isThere(const Command& command, const std::string& digest, const Run& run) {
@@ -91,7 +87,7 @@ std::vector<MadeCall> makeCalls(const Verb& verb, const SeveralCalls& calls, Pro
       if (call.values.is_object()) entry.update(call.values);
       entry.update(run.endPart());
       list.push_back(std::move(entry));
-      made.push_back({call.name, valueOf(command.app, "--output"), valueOf(command.app, "--preview"),
+      made.push_back({call.name, givenValue(command.app, "--output"), givenValue(command.app, "--preview"),
                       command.options.look});
     } catch (const std::exception&) {
       run.endPart();

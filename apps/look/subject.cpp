@@ -45,7 +45,7 @@ LookSubject LookSubject::of(const std::vector<std::string>& paths) {
     require(paths.size() == 1 || isMeshFile(file), file + ": of two files, both must be meshes");
   }
   if (paths.size() > 1) return {Kind::shape, path, paths.front()};
-  return {areShapes({path}) ? Kind::shape : Kind::volume, path};
+  return {areShapes({path}, {""}) ? Kind::shape : Kind::volume, path};
 }
 
 }  // namespace nephele::apps

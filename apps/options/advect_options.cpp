@@ -6,13 +6,8 @@ namespace nephele::apps {
 
 AdvectionOptions AdvectArguments::resolved() const {
   AdvectionOptions result = advection;
-  const auto isOnlyOf = [&](const std::vector<const CLI::Option*>& options, const char* name) {
-    for (const CLI::Option* option : options)
-      if (option->count() > 0)
-        throw CLI::ValidationError(option->get_name(), fmt::format("is for --method {} alone", name));
-  };
-  if (result.method != AdvectionMethod::selma) isOnlyOf(ofMap, "selma");
-  if (result.method != AdvectionMethod::grid) isOnlyOf({ofGrid}, "grid");
+  if (result.method != AdvectionMethod::selma) refuseGiven(ofMap, "is for --method selma alone");
+  if (result.method != AdvectionMethod::grid) refuseGiven({ofGrid}, "is for --method grid alone");
   result.steps = steps;
   result.dt = float(dt);
   result.mapCoarseness = float(mapCoarseness);

@@ -41,9 +41,7 @@ void addCombineOptions(CLI::App& app, CombineArguments& arguments) {
 }
 
 void CombineArguments::refuseFor(std::size_t inputs) const {
-  for (const CLI::Option* option : {combinationOption, blendOption})
-    if (inputs < 2 && option->count() > 0)
-      throw CLI::ValidationError(option->get_name(), "is for several inputs, which become one");
+  if (inputs < 2) refuseGiven({combinationOption, blendOption}, "is for several inputs, which become one");
 }
 
 Solids::Solids(const std::vector<std::string>& paths, const MeshRepairOptions& repair, int subdivide,

@@ -53,9 +53,7 @@ Mesh IsosurfaceOptions::surfaceOf(const std::string& volume, Run& run) const {
 }
 
 void IsosurfaceOptions::refuseFor(const std::string& mesh) const {
-  for (const CLI::Option* option : {gridOption, isovalueOption, adaptivityOption})
-    if (option->count() > 0)
-      throw CLI::ValidationError(option->get_name(), mesh + " is a mesh; this is for volumes");
+  refuseGiven({gridOption, isovalueOption, adaptivityOption}, mesh + " is a mesh; this is for volumes");
 }
 
 void addIsosurfaceOptions(CLI::App& app, IsosurfaceOptions& options) {

@@ -46,6 +46,11 @@ void refuseValue(const std::string& name, const std::string& text, const std::st
                              refusal(text, allowed));
 }
 
+void refuseGiven(const std::vector<const CLI::Option*>& options, const std::string& why) {
+  for (const CLI::Option* option : options)
+    if (option->count() > 0) throw CLI::ValidationError(option->get_name(), why);
+}
+
 CLI::Option* allowWords(CLI::Option* option, const std::vector<std::string>& words) {
   return option->check([words](const std::string& text) {
     return std::ranges::count(words, text) > 0

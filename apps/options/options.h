@@ -38,6 +38,9 @@ bool isFileType(std::string_view type);
 /// Refuses the value `text` of an option declared as `name` ("-o,--output"), saying what is allowed.
 [[noreturn]] void refuseValue(const std::string& name, const std::string& text, const std::string& allowed);
 
+/// Refuses the first of `options` that is given, saying `why` it cannot be.
+void refuseGiven(const std::vector<const CLI::Option*>& options, const std::string& why);
+
 /// Options of types that several verbs take. All are checked while parsing: what does not fit is a usage
 /// error (exit 2) that names the option, the value and what is allowed. The target's value at the call is the
 /// default that

@@ -47,10 +47,9 @@ std::vector<Given> givenOptions(const CLI::App& app) {
   std::vector<Given> result;
   for (const CLI::Option* option : app.get_options()) {
     const bool isOfCall = isOutputOfCall(*option), isTried = isMarked(*option, kOutput);
-    const bool isNamed = option->get_type_name().starts_with("[NAME=]");
     const std::string name = option->get_name(false, true);
     for (const std::string& value : option->results()) {
-      const std::string path = isNamed ? withoutName(value) : value;
+      const std::string path(pathOf(*option, value));
       result.push_back({name, path, isOutput(*option), isOfCall, isTried, fileOf(path)});
       if (!isOutput(*option) && withoutName(value) != value)
         result.push_back({name, value, false, false, false, fileOf(withoutName(value))});
@@ -72,6 +71,15 @@ bool isOutput(const CLI::Option& option) {
 
 bool isOutputOfCall(const CLI::Option& option) {
   return isOutput(option) && !option.check_lname("stats") && !option.check_lname("contact-sheet");
+}
+
+std::string_view pathOf(const CLI::Option& option, std::string_view value) {
+  return option.get_type_name().starts_with("[NAME=]") ? value.substr(value.find('=') + 1) : value;
+}
+
+std::string givenValue(const CLI::App& app, const std::string& option) {
+  const CLI::Option* found = app.get_option_no_throw(option);
+  return found && found->count() > 0 ? found->results().front() : "";
 }
 
 std::vector<std::string> outputsOf(const CLI::App& app) {

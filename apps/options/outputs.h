@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace nephele::apps {
@@ -18,6 +19,12 @@ bool isOutput(const CLI::Option& option);
 
 /// Whether it is one for each call that a command line stands for: --stats and --contact-sheet are of all.
 bool isOutputOfCall(const CLI::Option& option);
+
+/// The file that `value` of `option` names: "[NAME=]FILE" may have the name of a light in front.
+std::string_view pathOf(const CLI::Option& option, std::string_view value);
+
+/// The first value that is given for `option`; nothing where none is, or the verb has no such option.
+std::string givenValue(const CLI::App& app, const std::string& option);
 
 /// The files and folders that one call makes, but for streams.
 std::vector<std::string> outputsOf(const CLI::App& app);

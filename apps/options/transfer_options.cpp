@@ -70,8 +70,7 @@ void TransferArguments::requireMethod() const {
   // `none` and `fast` say what closest points are.
   if (warp.align != Alignment::none) others.push_back(align);
   if (warp.quality != WarpQuality::fast) others.push_back(quality);
-  for (const CLI::Option* option : others)
-    if (option->count() > 0) throw CLI::ValidationError(option->get_name(), "is for --method nacelle alone");
+  refuseGiven(others, "is for --method nacelle alone");
 }
 
 TransferOptions TransferArguments::chosen(const Mesh& reference, const Mesh& object, const Run& run) const {

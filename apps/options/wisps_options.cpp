@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "nephele/levelset/cloud/attribute_field.h"
 #include "nephele/levelset/cloud/cloud.h"
@@ -68,6 +69,22 @@ std::vector<WispGuide> inMesh(const std::string& path, const Mesh& mesh, const G
   return guidesOnVertices(pointsAt(guidesInside(level, box, options), repaired.mesh, run), options);
 }
 
+/// Places of dots are floats, which far from the origin lie further apart than voxels.
+void requireResolved(const Box& box, double voxelSize, const std::string& input) {
+  constexpr double kMostOfAVoxel = 0.125;
+  double farthest = 0;
+  for (int c = 0; c < 3; ++c)
+    farthest = std::max({farthest, std::abs(double(box.min[c])), std::abs(double(box.max[c]))});
+  const double error = farthest * double(std::numeric_limits<float>::epsilon()) / 2 / voxelSize;
+  if (error <= kMostOfAVoxel) return;
+  const std::string fault = fmt::format(
+      "wisps reach as far as {:.6g} from the origin, with voxels of {:.6g}: single precision would move "
+      "dots by up to {:.2g} of their size",
+      farthest, voxelSize, error);
+  if (input.empty()) throw CLI::ValidationError("--voxel-size", fault);
+  throw Error(input + ": " + fault + "; move the points nearer to the origin, or use larger voxels");
+}
+
 }  // namespace
 
 std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
@@ -84,6 +101,8 @@ std::vector<WispGuide> WispsArguments::readGuides(Run& run) const {
   run.begin("read");
   const Mesh mesh = readPoints(input);
   const On where = on.value_or(mesh.faceCount() == 0 ? On::vertices : On::surface);
+  if (where == On::vertices)
+    refuseGiven({guidesOption}, "is for guides that are scattered, not one on each point");
   require(where == On::vertices || mesh.faceCount() > 0,
           input + ": has no faces to scatter guides on; --on vertices puts one on each of its points");
   const double side = run.longestSide(boxOf(mesh));
@@ -126,6 +145,7 @@ WispVolumeOptions WispsArguments::resolved(const std::vector<WispGuide>& made, c
     throw CLI::ValidationError("--voxel-size",
                                fmt::format("voxels of {:g} are not from {:g} to {:g}", d.voxelSize,
                                            DotVolume::kLeastVoxel, DotVolume::kLargestVoxel));
+  requireResolved(wispBox(made, w), d.voxelSize, input);
   // A smear is soft as it is, and large dots make it dear.
   const bool smears = shutterOpen != 0 || shutterClose != 0;
   d.radius = dotRadiusOption->count() > 0 ? float(dotRadius.worldUnits(side))
@@ -175,7 +195,7 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
   addNumber(app, "--shape-size", a.shapeSize, 1e-6, any, "Longest side of the shape, world units.")
       ->excludes(input);
 
-  addCount(app, "--guides", a.guideCount, 1, 100000000, "Guides to scatter.");
+  a.guidesOption = addCount(app, "--guides", a.guideCount, 1, 100000000, "Guides to scatter.");
   addLength(app, "--wisp-size", a.size, "Radius of a wisp, where points bring none; percent: of the input.",
             Sign::positive);
   addNumber(app, "--wisp-size-variation", a.sizeVariation, 0, 0.99,
@@ -219,16 +239,19 @@ void addWispsOptions(CLI::App& app, WispsArguments& a) {
   a.dotRadiusOption =
       addLength(app, "--dot-radius", a.dotRadius,
                 "Radius of a dot; percent: of the wisps; default: 1.5 voxels, 0 with --shutter.");
-  app.add_option_function<std::string>(
-         "--velocity",
-         [&a](const std::string& text) { parseVelocity("--velocity", text, a.velocity.emplace()); },
-         "Motion of dots, added to that of the points: a vector, in world units or percent of the longest "
-         "side of "
-         "the wisps per unit of time, noise, curl noise, or a grid of vectors.")
-      ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
+  auto* velocity =
+      app.add_option_function<std::string>(
+             "--velocity",
+             [&a](const std::string& text) { parseVelocity("--velocity", text, a.velocity.emplace()); },
+             "Motion of dots, added to that of the points: a vector, in world units or percent of the "
+             "longest "
+             "side of "
+             "the wisps per unit of time, noise, curl noise, or a grid of vectors.")
+          ->type_name("X,Y,Z|noise:KEYS|curl:KEYS|FILE");
   app.add_option("--velocity-grid", a.velocityGrid,
                  "Grid of the velocity file; default: v, vel, velocity, or the only one of vectors.")
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->needs(velocity);
   addShutter(
       app, "units of time",
       [&a](double open, double close) { a.shutterOpen = float(open), a.shutterClose = float(close); },

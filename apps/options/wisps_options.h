@@ -34,7 +34,7 @@ struct WispsArguments {
   std::string velocityGrid;
   float shutterOpen = 0, shutterClose = 0;
   bool halfFloat = false;
-  const CLI::Option* dotRadiusOption = nullptr;
+  const CLI::Option *guidesOption = nullptr, *dotRadiusOption = nullptr;
 
   /// The guides, read or scattered. @throws Error naming the file.
   std::vector<WispGuide> readGuides(Run& run) const;

@@ -382,6 +382,18 @@ py::class_<PythonField<T>> addField(py::module_& module, const char* name, const
 
 }  // namespace
 
+std::string nameFrom(const py::handle& key, const std::string& what) {
+  if (!py::isinstance<py::str>(key))
+    throw py::type_error("the name of " + what + " is a text, got " + py::repr(key).cast<std::string>());
+  return key.cast<std::string>();
+}
+
+std::string pathFrom(const py::handle& path) {
+  const auto text = py::reinterpret_steal<py::object>(PyOS_FSPath(path.ptr()));
+  if (!text) throw py::error_already_set();
+  return text.cast<std::string>();
+}
+
 std::string shapeText(const py::array& array) {
   return "an array of shape " + std::string(py::str(array.attr("shape")));
 }

@@ -80,7 +80,7 @@ def verb(name):
     results = {"levelset": "Grid", "cloud": "Grid", "mesh": "Mesh", "transfer": "Mesh", "render": "Picture",
                "cut": "List[Dict[str, Any]]", "turntable": "List[Any]"}
     first = {"levelset": "shapes: Union[Shape, List[Shape]]", "cloud": "shape: Union[Shape, List[Shape], None] = ...",
-             "advect": "what: Any", "wisps": "source: Any", "mesh": "what: Union[Grid, Mesh, Path]", "cut": "model: Shape",
+             "advect": "what: Any", "wisps": "source: Any = ...", "mesh": "what: Union[Grid, Mesh, Path]", "cut": "model: Shape",
              "transfer": "reference: Shape, object: Shape", "transform": "what: Any",
              "render": "volumes: Union[Volume, List[Volume]]", "turntable": "volumes: Union[Volume, List[Volume]]"}
     known = {"output", "progress", "from", "to"} | ({"frames"} if name == "turntable" else set())

@@ -44,7 +44,12 @@ void setFaces(Mesh& mesh, const py::object& object) {
   if (!py::isinstance<py::array>(object) && PySequence_Check(object.ptr())) {
     const auto faces = py::reinterpret_borrow<py::sequence>(object);
     bool isEven = true;
-    for (std::size_t f = 1; f < faces.size() && isEven; ++f) isEven = py::len(faces[f]) == py::len(faces[0]);
+    for (std::size_t f = 0; f < faces.size() && isEven; ++f) {
+      if (PySequence_Check(py::object(faces[f]).ptr()) == 0)
+        throw py::value_error("F: one row for each face is needed, got a number as face " +
+                              std::to_string(f));
+      isEven = py::len(faces[f]) == py::len(faces[0]);
+    }
     if (!isEven) {
       for (std::size_t f = 0; f < faces.size(); ++f) {
         const Packed<std::int64_t> face = facesFrom(faces[f]);
@@ -92,7 +97,7 @@ std::shared_ptr<felt::Shape> makeMesh(
   setFaces(shape->mesh, faces);
   if (attributes)
     for (const auto& [key, value] : *attributes)
-      addAttribute(shape->mesh, key.cast<std::string>(), py::reinterpret_borrow<py::object>(value));
+      addAttribute(shape->mesh, nameFrom(key, "an attribute"), py::reinterpret_borrow<py::object>(value));
   for (const auto& [group, first, count] : groups) shape->mesh.groups.push_back({group, first, count});
   requireValid(shape->mesh);
   return shape;

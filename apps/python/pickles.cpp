@@ -1,4 +1,4 @@
-// What pickles keep of grids and pictures: all that they are.
+// What pickles keep of meshes, grids and pictures: all that they are.
 #include <pybind11/stl.h>
 
 #include <bit>
@@ -109,9 +109,51 @@ std::shared_ptr<ExrContent> pictureOfState(const py::tuple& state) {
   return content;
 }
 
+py::tuple stateOfMesh(const std::shared_ptr<felt::Shape>& self) {
+  const Mesh& mesh = self->mesh;
+  py::list attributes, groups;
+  for (const MeshAttribute& a : mesh.attributes)
+    attributes.append(
+        py::make_tuple(a.name, int(a.domain), a.width, arrayOf(a.values.data(), a.values.size())));
+  for (const MeshGroup& g : mesh.groups)
+    groups.append(py::make_tuple(g.name, g.firstFace, g.faceCount, g.material));
+  return py::make_tuple(
+      self->name, arrayOf(reinterpret_cast<const double*>(mesh.positions.data()), 3 * mesh.positions.size()),
+      arrayOf(mesh.corners.data(), mesh.corners.size()),
+      arrayOf(mesh.faceStart.data(), mesh.faceStart.size()), attributes, groups, mesh.materialFiles);
+}
+
+std::shared_ptr<felt::Shape> meshOfState(const py::tuple& state) {
+  auto shape = std::make_shared<felt::Shape>();
+  shape->name = state[0].cast<std::string>();
+  Mesh& mesh = shape->mesh;
+  const auto positions = state[1].cast<Packed<double>>();
+  for (py::ssize_t i = 0; i + 3 <= positions.size(); i += 3)
+    mesh.positions.emplace_back(positions.data()[i], positions.data()[i + 1], positions.data()[i + 2]);
+  const auto corners = state[2].cast<Packed<std::uint32_t>>(),
+             starts = state[3].cast<Packed<std::uint32_t>>();
+  mesh.corners.assign(corners.data(), corners.data() + corners.size());
+  mesh.faceStart.assign(starts.data(), starts.data() + starts.size());
+  for (const py::handle& item : state[4]) {
+    const auto [name, domain, width, array] = item.cast<std::tuple<std::string, int, int, Packed<float>>>();
+    mesh.attributes.push_back({name, MeshAttribute::Domain(domain), width,
+                               std::vector<float>(array.data(), array.data() + array.size())});
+  }
+  for (const py::handle& item : state[5]) {
+    const auto [name, first, count, material] =
+        item.cast<std::tuple<std::string, std::uint32_t, std::uint32_t, std::string>>();
+    mesh.groups.push_back({name, first, count, material});
+  }
+  mesh.materialFiles = state[6].cast<std::vector<std::string>>();
+  requireValid(mesh);
+  return shape;
+}
+
 }  // namespace
 
 void addPickles(py::module_& module) {
+  module.def("_state_of_mesh", stateOfMesh);
+  module.def("_mesh_of_state", meshOfState);
   module.def("_state_of_grid", stateOfGrid);
   module.def("_grid_of_state", gridOfState);
   module.def("_state_of_picture", stateOfPicture);

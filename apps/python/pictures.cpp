@@ -95,16 +95,15 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
   if (count == 3) add("A", true, &one, 0);
   if (layers)
     for (const auto& [key, value] : *layers) {
+      const std::string name = nameFrom(key, "a layer");
       const Packed<float> layer = packedFrom<float>(value, "layer");
       if (layer.ndim() < 2 || layer.ndim() > 3 || layer.shape(0) != image.height ||
           layer.shape(1) != image.width)
-        throw py::value_error("layer '" + key.cast<std::string>() + "': got " + shapeText(layer) +
-                              " for a picture of " + std::to_string(image.height) + " rows of " +
-                              std::to_string(image.width));
+        throw py::value_error("layer '" + name + "': got " + shapeText(layer) + " for a picture of " +
+                              std::to_string(image.height) + " rows of " + std::to_string(image.width));
       const auto width = std::size_t(layer.ndim() == 3 ? layer.shape(2) : 1);
       if (width > 4) throw py::value_error("a layer has at most 4 channels");
       for (std::size_t c = 0; c < width; ++c) {
-        const auto name = key.cast<std::string>();
         add(layer.ndim() == 2 ? name : name + "." + (width <= 3 && name.size() == 1 ? "XYZ" : "RGBA")[c],
             false, layer.data() + c, width);
       }
@@ -112,8 +111,9 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
   return content;
 }
 
-void save(const Self& self, const std::string& path, const std::string& view, double exposure,
+void save(const Self& self, const py::object& file, const std::string& view, double exposure,
           const std::array<float, 3>& background) {
+  const std::string path = pathFrom(file);
   Watch watch;
   const ViewTransform transform = viewOfName(view, exposure, background);
   const bool isScreen = path.ends_with(".png") || path.ends_with(".PNG");

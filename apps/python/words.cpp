@@ -354,6 +354,8 @@ void addWords(py::module_& module) {
   addOperators<Vec3f>(module, "VectorField");
   addOperators<Mat3f>(module, "MatrixField");
   const auto component = [](const py::object& self, int index) {
+    // Loops over the three end by this.
+    if (index < 0 || index > 2) throw py::index_error("fields of vectors have the components 0, 1 and 2");
     return call("component", py::make_tuple(self, index), {}, "component(a0, a1)", true);
   };
   auto vector = module.attr("VectorField");

@@ -46,7 +46,7 @@ void renderVolume(const RenderVerbOptions& options, Run& run) {
   const SceneOptions& scene = options.scene;
   const PictureFiles files{options.files.output, options.files.preview, scene.deep};
   PictureOptions picture = options.picture.withView();
-  if (!isScript(scene.inputs) && areShapes(scene.inputs))
+  if (!isScript(scene.inputs) && areShapes(scene.inputs, picture.volumes.seenGrids(scene.inputs.size())))
     // Nothing is bright there, and textures are to look as they do.
     return writeShapesPicture(*options.app, scene, options.picture.withView(ViewCurve::standard), files, run);
   // Keys take the contents of all files.

@@ -48,17 +48,42 @@ class PropertyNames {
  public:
   explicit PropertyNames(std::set<std::string> taken) : taken_(std::move(taken)) {}
 
-  std::string add(std::string name) {
-    for (char& c : name) c = c > ' ' && c <= '~' ? c : '_';
-    if (name.empty()) name = "unnamed";
-    std::string unique = name;
-    for (int k = 2; !taken_.insert(unique).second; ++k) unique = fmt::format("{}_{}", name, k);
+  /// Says that a name is going to be added, so that others do not become it.
+  void expect(const std::string& name) { expected_.insert(word(name)); }
+  std::string add(const std::string& name) {
+    const std::string wanted = word(name);
+    std::string unique = wanted;
+    for (int k = 2; taken_.count(unique) > 0 || (k > 2 && expected_.count(unique) > 0); ++k)
+      unique = fmt::format("{}_{}", wanted, k);
+    taken_.insert(unique);
     return unique;
   }
 
  private:
-  std::set<std::string> taken_;
+  static std::string word(std::string name) {
+    for (char& c : name) c = c > ' ' && c <= '~' ? c : '_';
+    return name.empty() ? "unnamed" : name;
+  }
+  std::set<std::string> taken_, expected_;
 };
+
+// Names that readers would make texture coordinates, colours or an opacity of, were they those of attributes.
+std::set<std::string> meaningfulNames(const std::vector<const MeshAttribute*>& attributes,
+                                      const MeshAttribute* color, bool hasUv) {
+  const auto has = [&](const std::set<std::string>& names) {
+    return std::ranges::any_of(
+        attributes, [&](const MeshAttribute* a) { return a->width == 1 && names.count(a->name) > 0; });
+  };
+  std::set<std::string> result;
+  const std::set<std::string> u{"s", "u", "texture_u"}, v{"t", "v", "texture_v"}, red{"red", "diffuse_red"},
+      green{"green", "diffuse_green"}, blue{"blue", "diffuse_blue"}, alpha{"alpha", "diffuse_alpha"};
+  if (!hasUv && has(u) && has(v))
+    for (const auto* names : {&u, &v}) result.insert(names->begin(), names->end());
+  if (!color && has(red) && has(green) && has(blue))
+    for (const auto* names : {&red, &green, &blue}) result.insert(names->begin(), names->end());
+  if (color && color->width == 3) result.insert(alpha.begin(), alpha.end());
+  return result;
+}
 
 // One list of the faces: components first .. first + count - 1 of a corner attribute.
 struct FaceList {
@@ -137,7 +162,12 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
   ByteWriter out(stream);
   out.text("ply\nformat binary_little_endian 1.0\n");
   out.text(fmt::format("element vertex {}\n", mesh.positions.size()));
-  PropertyNames names({});
+  PropertyNames names(meaningfulNames(others, color, uvPerVertex));
+  const auto nameOf = [](const MeshAttribute& a, int k) {
+    return a.width == 1 ? a.name : fmt::format("{}_{}", a.name, k);
+  };
+  for (const MeshAttribute* a : others)
+    for (int k = 0; k < a->width; ++k) names.expect(nameOf(*a, k));
   for (const char* axis : {"x", "y", "z"})
     out.text(fmt::format("property {} {}\n", fitsFloat ? "float" : "double", names.add(axis)));
   static constexpr const char* kChannels[] = {"red", "green", "blue", "alpha"};
@@ -147,9 +177,7 @@ void writePly(std::FILE* stream, const Mesh& mesh) {
   for (const char* coordinate : {"s", "t"})
     if (uvPerVertex) out.text(fmt::format("property float {}\n", names.add(coordinate)));
   for (const MeshAttribute* a : others)
-    for (int k = 0; k < a->width; ++k)
-      out.text(fmt::format("property float {}\n",
-                           names.add(a->width == 1 ? a->name : fmt::format("{}_{}", a->name, k))));
+    for (int k = 0; k < a->width; ++k) out.text(fmt::format("property float {}\n", names.add(nameOf(*a, k))));
   out.text(fmt::format("element face {}\nproperty list {} {} vertex_indices\n", mesh.faceCount(),
                        mostCorners < 256 ? "uchar" : "uint",
                        mesh.positions.size() < 0x80000000u ? "int" : "uint"));

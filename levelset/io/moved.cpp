@@ -73,6 +73,9 @@ VdbGrid moved(const VdbGrid& grid, const Similarity& by) {
   require(
       from.transform().isLinear(),
       fmt::format("grid {} has a frustum transform; resample it to a linear one", detail::displayName(from)));
+  require(by.scale > 0 && std::isfinite(by.scale),
+          fmt::format("grid {}: expected a scale that is > 0 and finite, got {}", detail::displayName(from),
+                      by.scale));
   const openvdb::GridBase::Ptr result = withValuesOf(from, by);
   // OpenVDB multiplies row vectors from the left.
   openvdb::Mat4d map = openvdb::Mat4d::identity();

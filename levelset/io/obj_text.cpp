@@ -107,11 +107,17 @@ void writeObjLibraries(TextWriter& out, const std::vector<std::string>& files, c
 
 void writeObjFaces(TextWriter& out, const Mesh& mesh, const ObjCoordinates& uv, bool areGroupsNamed,
                    std::uint64_t vertices, std::uint64_t coordinates) {
-  std::size_t group = 0;
+  std::size_t group = 0, end = 0;
   std::string material;
   for (std::size_t f = 0; f < mesh.faceCount(); ++f) {
+    if (group > 0 && f == end && (group == mesh.groups.size() || mesh.groups[group].firstFace > f)) {
+      if (areGroupsNamed) out.text("g default\n");
+      if (!material.empty()) out.text("usemtl \n");
+      material.clear();
+    }
     for (; group < mesh.groups.size() && mesh.groups[group].firstFace <= f; ++group) {
       const MeshGroup& begun = mesh.groups[group];
+      end = begun.firstFace + begun.faceCount;
       if (areGroupsNamed) out.text("g ").text(oneLine(begun.name)).text("\n");
       if (begun.material != material) out.text("usemtl ").text(oneLine(begun.material)).text("\n");
       material = begun.material;

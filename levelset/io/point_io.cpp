@@ -7,6 +7,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -94,8 +95,8 @@ std::optional<Axes> axesOf(const std::vector<std::string_view>& titles) {
   return axes;
 }
 
-/// The columns beside x, y and z, as attributes of one number each. One that is no number anywhere is left
-/// out.
+/// The columns beside x, y and z, as attributes of one number each. One that holds words is left out; what is
+/// missing among numbers is NaN, which whoever needs that number refuses.
 class OtherColumns {
  public:
   OtherColumns(const std::vector<std::string_view>& titles, const Axes& axes) {
@@ -105,15 +106,19 @@ class OtherColumns {
   }
 
   void add(const std::vector<std::string_view>& row) {
-    ++rows_;
-    for (Column& column : columns_)
-      if (const auto value = column.place < row.size() ? numberOf(row[column.place]) : std::nullopt)
-        column.attribute.values.push_back(float(*value));
-    std::erase_if(columns_, [&](const Column& column) { return column.attribute.values.size() < rows_; });
+    std::erase_if(columns_, [&](Column& column) {
+      const std::string_view cell = column.place < row.size() ? row[column.place] : std::string_view();
+      const auto value = numberOf(cell);
+      column.attribute.values.push_back(float(value.value_or(std::numeric_limits<double>::quiet_NaN())));
+      return !value && !cell.empty() && !isNumber(cell);
+    });
   }
 
   /// Colours of three columns are one attribute, as those of other files are.
   std::vector<MeshAttribute> attributes() && {
+    std::erase_if(columns_, [](const Column& column) {
+      return std::ranges::all_of(column.attribute.values, [](float value) { return std::isnan(value); });
+    });
     const std::array<std::string, 3> colours[] = {
         {"red", "green", "blue"}, {"r", "g", "b"}, {"cdr", "cdg", "cdb"}, {"colorr", "colorg", "colorb"}};
     std::vector<MeshAttribute> result;
@@ -144,7 +149,6 @@ class OtherColumns {
     MeshAttribute attribute;
   };
   std::vector<Column> columns_;
-  std::size_t rows_ = 0;
 };
 
 Mesh readTable(const detail::MeshFile& file) {

@@ -7,6 +7,8 @@
 //
 // The hierarchy may take one of two triangles whose distances differ by less than float rounding: the
 // distance is then too long by less than 1e-6 of the mesh, or of the way to a point farther away than that.
+// From afar that may be the far side of a thin shape, so that outside of the box only the box says where a
+// point is.
 #include "nephele/levelset/mesh/exact_distance.h"
 
 #include <fmt/format.h>
@@ -139,6 +141,8 @@ ExactDistance::ExactDistance(const Mesh& mesh) {
   mesh_.corners = mesh.corners;
   mesh_.faceStart = mesh.faceStart;
   centre_ = (low + high) * 0.5;
+  low_ = low;
+  high_ = high;
   size_ = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
   require(size_ > 0 && std::isfinite(size_), "exact distance: all faces of the mesh are one point");
   Mesh local = mesh_;
@@ -183,11 +187,14 @@ ExactDistance::Hit ExactDistance::at(const Vec3d& p, Cursor& cursor) const {
   cursor = {hit.point, true};
   const Vec3d away = p - hit.point, &normal = normals_[hit.triangle][std::size_t(nearest.feature)];
   const double distance = length(away);
-  const double side = isSolid_ && dot(away, normal) < 0 ? 1.0 : -1.0;
+  bool isInBox = true;
+  for (int c = 0; c < 3; ++c) isInBox = isInBox && p[c] >= low_[c] && p[c] <= high_[c];
+  const bool isBehind = isSolid_ && dot(away, normal) < 0;
+  const double side = isBehind && isInBox ? 1.0 : -1.0;
   hit.distance = side * distance;
   // On a face the normal is the better direction; at edges and corners only where rounding leaves no other.
   constexpr double kOnSurface = 1e-9;
-  const bool isOnFace = nearest.feature == detail::Feature::face && isSolid_;
+  const bool isOnFace = nearest.feature == detail::Feature::face && isSolid_ && (isInBox || !isBehind);
   hit.gradient = isOnFace || distance <= kOnSurface * size_ ? -normal : away * (side / distance);
   return hit;
 }

@@ -11,11 +11,14 @@
 namespace nephele {
 
 /// Signed distance to a triangle mesh without a grid, in double precision relative to the middle of the
-/// mesh: exact far from the origin too. Positive inside. Safe to use from many threads.
+/// mesh: exact far from the origin too. Of triangles whose distances differ by less than 1e-6 of the mesh, or
+/// of the way to it, either may be taken as the nearest, and the distance be too long by as much. Positive
+/// inside. Safe to use from many threads.
 ///
 /// A mesh that is not closed, or whose edges do not all have two faces, has no inside: minus the distance
 /// everywhere. A closed mesh that is inside out counts as turned right. The sign is that of the pseudo-normal
-/// of the nearest face, edge or corner, and holds where sheets do not overlap.
+/// of the nearest face, edge or corner, and holds where sheets do not overlap and are farther apart than that
+/// 1e-6; outside of the box of the mesh it is always minus.
 class ExactDistance {
  public:
   /// Coincident positions count as one. Cost: n log n in the number of triangles.
@@ -61,7 +64,7 @@ class ExactDistance {
   Mesh mesh_;  ///< Relative to centre_.
   std::unique_ptr<NearestOnMesh> nearest_;
   std::vector<std::array<Vec3d, 7>> normals_;
-  Vec3d centre_;
+  Vec3d centre_, low_, high_;
   double size_ = 0, area_ = 0, orientation_ = 1;
   bool isSolid_ = false;
 };

@@ -18,7 +18,8 @@ struct MeshDistanceOptions {
 /// Signed distance to a closed mesh as a field, positive inside, world units.
 ///
 /// Fine bricks near the surface and coarser levels behind them, each twice the voxel size of the one before,
-/// within 0.05 fine voxels of the exact distance away from the medial axis. Beyond the bands: the constant at
+/// within 0.05 fine voxels of the exact distance to smooth shapes away from the medial axis, and within 0.3
+/// beside the edges of others, where distances curve at once. Beyond the bands: the constant at
 /// its edge. Memory follows the surface, not the width of the band.
 /// @throws Error for an empty mesh, polygons or positions that are not finite, voxels that are not > 0, bands
 /// that are not > 0 or too wide; Cancelled.

@@ -94,6 +94,7 @@ void checkVolume(const Mesh& mesh, const VoxelGrid<float>& grid, const MeshToLev
   // Triangles of parts that overlap count the overlap twice; the solid they bound counts it once.
   progress.begin("volume of the solid");
   const double solid = solidVolume(mesh);
+  require(solid > 0, "level set: the mesh encloses nothing: it is inside out, or flat");
   judge(mesh, grid, gridVolume, solid, options, progress);
   constexpr double kOverlap = 0.005;
   if (std::abs(meshVolume / solid - 1) > kOverlap)

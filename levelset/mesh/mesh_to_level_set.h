@@ -19,8 +19,8 @@ struct MeshToLevelSetOptions {
 /// Signed distance to a closed, outward-oriented triangle mesh in a narrow band, positive inside.
 /// Exact to float rounding where the sheets of the mesh do not overlap; else OpenVDB's union of them, with a
 /// note.
-/// @throws Error if the mesh is not closed, or if the volume differs from the mesh's by more than is allowed,
-/// naming both and a voxel size to try; Cancelled.
+/// @throws Error if the mesh is not closed or encloses nothing, as one inside out, or if the volume differs
+/// from the mesh's by more than is allowed, naming both and a voxel size to try; Cancelled.
 VoxelGrid<float> meshToLevelSet(const Mesh& mesh, const MeshToLevelSetOptions& options,
                                 const Progress& progress = silent());
 

@@ -94,8 +94,9 @@ class GuideAttributes {
 
 WispGuide blended(const std::array<WispGuide, 3>& g, const Vec3f& w) {
   WispGuide result;
+  // What all three agree on stays as it is, to the last bit: white is no colour.
   const auto blend = [&](auto member) {
-    return w.x * g[0].*member + w.y * g[1].*member + w.z * g[2].*member;
+    return g[0].*member + w.y * (g[1].*member - g[0].*member) + w.z * (g[2].*member - g[0].*member);
   };
   result.position = blend(&WispGuide::position);
   result.size = blend(&WispGuide::size);

@@ -284,14 +284,15 @@ void FieldMarcher::emitPiece(std::size_t index) {
     return;
   }
   const float middle = 0.5f * (p.begin + p.end), depth = depthOf(p), share = depth / all;
-  emitHalf(p.ray, p.begin, middle, p.first, p.middle, share * (p.first + p.middle));
-  emitHalf(p.ray, middle, p.end, p.middle, p.last, share * (p.middle + p.last));
+  emitHalf(p.ray, p.begin, middle, p.first, p.middle, share);
+  emitHalf(p.ray, middle, p.end, p.middle, p.last, share);
   states_[p.ray].opticalDepth += depth;
 }
 
-// A straight density between two places, which adds `depth`.
-void FieldMarcher::emitHalf(std::uint32_t ray, float begin, float end, float first, float last, float depth) {
+// A straight density between two places, which adds `share` of the sum of both ends.
+void FieldMarcher::emitHalf(std::uint32_t ray, float begin, float end, float first, float last, float share) {
   State& state = states_[ray];
+  const float depth = share * (first + last);
   MarchStep& light = state.light;
   if (!(depth > 0)) {
     closeLight(ray);
@@ -315,7 +316,8 @@ void FieldMarcher::emitHalf(std::uint32_t ray, float begin, float end, float fir
     return;
   }
   closeLight(ray);
-  const float perDensity = 2 * depth / ((first + last) * length), slope = (last - first) / length;
+  // Not from the depth, as the least densities times a length are 0.
+  const float perDensity = 2 * share / length, slope = (last - first) / length;
   float at = begin, near = first;
   while (at < end && state.lit < hidden_) {
     const float left = end - at, thickest = perDensity * std::max(near, last);

@@ -90,7 +90,7 @@ class FieldMarcher {
   void halve(std::size_t index);
   void emit();
   void emitPiece(std::size_t index);
-  void emitHalf(std::uint32_t ray, float begin, float end, float first, float last, float depth);
+  void emitHalf(std::uint32_t ray, float begin, float end, float first, float last, float share);
   void closeLight(std::uint32_t ray);
   void addLight(State& state, MarchStep step, std::vector<MarchStep>& steps) const;
   void growLight(State& state) const;

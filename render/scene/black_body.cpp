@@ -9,11 +9,15 @@
 // Limits: chromaticities are off by up to 0.003 in x and y.
 #include "nephele/render/scene/black_body.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 #include <utility>
+
+#include "nephele/modeling/base/error.h"
 
 namespace nephele {
 
@@ -72,6 +76,7 @@ Vec3f blackBody(double kelvin) {
 }
 
 BlackBodyColours::BlackBodyColours(float hottest) : perKelvin_(float(kSteps) / std::max(hottest, 1.0f)) {
+  require(std::isfinite(hottest), fmt::format("black body: expected a finite temperature, got {}", hottest));
   if (hottest <= 0) {
     table_.resize(kSteps + 2);
     return;
@@ -91,7 +96,7 @@ class BlackBodyNode final : public FieldNode<Vec3f> {
     float* const kelvin = frame.lane();
     kelvin_->eval(points, {kelvin}, scratch);
     for (int i = 0; i != points.count; ++i) {
-      const Vec3f colour = (*colours_)(kelvin[i] > 0 ? kelvin[i] : 0.0f);
+      const Vec3f colour = (*colours_)(kelvin[i]);
       for (int c = 0; c != 3; ++c) values[std::size_t(c)][i] = colour[c];
     }
   }

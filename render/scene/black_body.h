@@ -17,12 +17,13 @@ Vec3d blackBodyXyz(double kelvin);
 /// where blue is negative) have those channels at 0. 0 at 0 K and below. Cost: some 80 exponentials.
 Vec3f blackBody(double kelvin);
 
-/// Colours of all black bodies between 0 K and `hottest`, from a table; those beyond count as the nearest.
+/// Colours of all black bodies between 0 K and `hottest`, from a table; those beyond count as the nearest,
+/// NaN as 0 K. @throws Error unless `hottest` is finite.
 class BlackBodyColours {
  public:
   explicit BlackBodyColours(float hottest);
   Vec3f operator()(float kelvin) const {
-    const float x = std::clamp(kelvin * perKelvin_, 0.0f, float(kSteps));
+    const float x = kelvin > 0 ? std::min(kelvin * perKelvin_, float(kSteps)) : 0.0f;
     const int i = int(x);
     return table_[std::size_t(i)] + (table_[std::size_t(i + 1)] - table_[std::size_t(i)]) * (x - float(i));
   }

@@ -137,7 +137,7 @@ class Fields {
   const std::string& file_;
 };
 
-CameraKey keyOf(const Fields& fields, const RotationOrder& order, double filmWidth) {
+CameraKey keyOf(const Fields& fields, const RotationOrder& order, std::optional<double> filmWidth) {
   fields.allowOnly({"frame", "position", "rotation", "look_at", "up", "fov", "vertical_fov", "focal_length",
                     "orthographic_width", "f_stop", "lens_radius", "focus_distance"});
   CameraKey key;
@@ -163,8 +163,10 @@ CameraKey keyOf(const Fields& fields, const RotationOrder& order, double filmWid
     if (!(*focal > 0))
       fields.refuse("focal_length",
                     fmt::format("frame {:g}: focal_length must be above 0, got {:g}", key.frame, *focal));
-    key.fovDegrees = fovDegreesOf(*focal, filmWidth);
+    key.fovDegrees = fovDegreesOf(*focal, filmWidth.value_or(kFilmWidth));
+    key.hasFocalLength = true;
   }
+  key.filmWidth = filmWidth;
   key.orthographicWidth = fields.number("orthographic_width");
   key.fStop = fields.number("f_stop");
   key.lensRadius = fields.number("lens_radius");
@@ -252,9 +254,9 @@ CameraMotion parseCameraJson(const std::string& text, const std::string& name) {
   if (interpolation != "smooth" && interpolation != "linear")
     top.refuse("interpolation",
                "interpolation must be smooth or linear, not " + printable(interpolation, 60));
-  const double filmWidth = top.number("film_width").value_or(36.0);
-  if (!(filmWidth > 0))
-    top.refuse("film_width", fmt::format("film_width must be above 0, got {:g}", filmWidth));
+  const std::optional<double> filmWidth = top.number("film_width");
+  if (filmWidth && !(*filmWidth > 0))
+    top.refuse("film_width", fmt::format("film_width must be above 0, got {:g}", *filmWidth));
   if (!top.has("frames") || !json["frames"].is_array())
     top.refuse("frames", "must have 'frames', a list of objects");
   const Json& frames = json["frames"];
@@ -318,9 +320,11 @@ std::string cameraJsonText(const CameraMotion& motion) {
       if (value) frames += fmt::format(", \"{}\": {:.12g}", name, *value);
     frames += "}";
   }
+  const std::optional<double> filmWidth = motion.keys().front().filmWidth;
   return fmt::format(
-      "{{\n  \"rotation_order\": \"ZXY\",\n  \"interpolation\": \"{}\",\n  \"frames\": [{}\n  ]\n}}\n",
-      motion.isSmooth() ? "smooth" : "linear", frames);
+      "{{\n  \"rotation_order\": \"ZXY\",\n  \"interpolation\": \"{}\",\n{}  \"frames\": [{}\n  ]\n}}\n",
+      motion.isSmooth() ? "smooth" : "linear",
+      filmWidth ? fmt::format("  \"film_width\": {:.12g},\n", *filmWidth) : "", frames);
 }
 
 }  // namespace nephele

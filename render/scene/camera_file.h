@@ -16,7 +16,7 @@ namespace nephele {
 /// `.json`: an object with `frames`, a list of objects with `frame`, `position`, and `rotation` or `look_at`
 /// [with `up`], optionally `fov` (horizontal), `vertical_fov` or `focal_length`, `orthographic_width`,
 /// `f_stop` or `lens_radius`, `focus_distance`. Beside `frames`: `rotation_order` ("ZXY"), `interpolation`
-/// ("smooth" or "linear"), `film_width` (36, in the unit of `focal_length`). Other names are refused.
+/// ("smooth" or "linear"), `film_width` (36, millimetres as `focal_length`). Other names are refused.
 
 /// Reads a file by its extension; `order` is for .chan files.
 /// @throws Error as "path:line: what is wrong".

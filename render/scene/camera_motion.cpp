@@ -157,6 +157,9 @@ CameraKey CameraMotion::at(double frame) const {
   key.target = sampled([](const CameraKey& k) { return k.target; }, true);
   key.fovDegrees = angle(&CameraKey::fovDegrees);
   key.verticalFovDegrees = angle(&CameraKey::verticalFovDegrees);
+  key.filmWidth = keys_.front().filmWidth;
+  key.hasFocalLength =
+      std::ranges::all_of(keys_, [](const CameraKey& k) { return !k.fovDegrees || k.hasFocalLength; });
   key.orthographicWidth = lens(&CameraKey::orthographicWidth);
   key.fStop = lens(&CameraKey::fStop);
   key.lensRadius = lens(&CameraKey::lensRadius);

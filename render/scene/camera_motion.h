@@ -29,6 +29,10 @@ struct CameraKey {
   Vec3d up{0, 1, 0};
   /// Angle of view across the picture, or from its top to its bottom: one of them.
   std::optional<double> fovDegrees{}, verticalFovDegrees{};
+  /// Millimetres, where it is known; the same at all keys.
+  std::optional<double> filmWidth{};
+  /// `fovDegrees` is that of a focal length in front of this film.
+  bool hasFocalLength = false;
   std::optional<double> orthographicWidth{};
   /// One of them; the f-stop is focal length / diameter of the lens.
   std::optional<double> fStop{}, lensRadius{};

@@ -82,8 +82,10 @@ struct Environment::Data {
 };
 
 Environment::Environment(int width, int height, std::vector<Vec3f> radiance, const Options& options) {
-  require(height >= 1 && width == 2 * height && radiance.size() == std::size_t(width) * std::size_t(height),
+  require(height >= 1 && width == 2 * height,
           fmt::format("sky: expected a map twice as wide as high, got {} x {}", width, height));
+  require(radiance.size() == std::size_t(width) * std::size_t(height),
+          fmt::format("sky: expected {} x {} colours, got {}", width, height, radiance.size()));
   require(std::isfinite(options.rotationDegrees),
           fmt::format("sky: expected a rotation that is finite, got {}", options.rotationDegrees));
   require(options.intensity >= 0 && options.intensity <= 1e6f,
@@ -92,6 +94,8 @@ Environment::Environment(int width, int height, std::vector<Vec3f> radiance, con
     for (int c = 0; c != 3; ++c) {
       require(std::isfinite(value[c]), "sky: the map holds numbers that are not finite");
       value[c] = std::max(value[c], 0.0f) * options.intensity;
+      require(std::isfinite(value[c]),
+              fmt::format("sky: the map is too bright to be multiplied by {:g}", options.intensity));
     }
   data_ = std::make_shared<const Data>(width, height, std::move(radiance));
   hasSpots_ = options.hasSpots;
@@ -174,6 +178,7 @@ Vec3f Environment::mean() const {
 }
 
 std::vector<Vec3f> Environment::around(const std::vector<Vec3f>& directions) const {
+  if (directions.empty()) return {};
   // Row by row, added in their order.
   struct Part {
     Vec3d sum;

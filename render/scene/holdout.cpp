@@ -30,7 +30,7 @@ void addKnots(const std::vector<DeepSample>& samples, std::vector<Change>& chang
   changes.clear();
   for (const DeepSample& sample : samples) {
     const float alpha = std::clamp(sample.alpha, 0.0f, 1.0f);
-    if (alpha == 0 || std::isinf(sample.z)) continue;
+    if (!(alpha > 0) || !std::isfinite(sample.z)) continue;
     const double depth = alpha == 1 ? kOpaque : -std::log1p(-double(alpha));
     const bool thick = sample.zBack > sample.z && std::isfinite(sample.zBack) && alpha < 1;
     if (thick) {

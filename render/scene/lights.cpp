@@ -78,6 +78,10 @@ void Lights::check() const {
     require(!name.empty() && name.find_first_of(". ,=") == std::string::npos,
             fmt::format("light: expected a name without blanks, dots, commas and =, got '{}'",
                         printable(name, 60)));
+    require(name.size() <= kLongestName, fmt::format("light: expected a name of at most {} bytes, got '{}'",
+                                                     kLongestName, printable(name, 60)));
+    require(name != "air" && name != "objects",
+            fmt::format("light: the name '{}' is that of a layer of its own; choose another", name));
     require(seen.insert(name).second, fmt::format("light: the name '{}' is taken twice", name));
   }
 }

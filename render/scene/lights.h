@@ -107,6 +107,8 @@ struct Lights {
 
   /// Most suns, and most points and spots.
   static constexpr std::size_t kMost = 8;
+  /// Bytes of a name: channels of a picture, of up to 255, have it with a layer's name before and after.
+  static constexpr std::size_t kLongestName = 200;
   bool hasSky() const { return map || sky != Vec3f{}; }
   /// Of every layer light_<name>: suns, points and spots, the sky.
   std::vector<std::string> names() const;

@@ -53,6 +53,29 @@ TEST_F(Lengths, OfCamerasMayBePercentages) {
   EXPECT_NE(alphaOf(lens + "--lens-radius 20% --focus-distance 300%"), alphaOf(lens));
 }
 
+// Focal lengths and f-stops of a camera file are those of its film; --film-width goes before it.
+TEST_F(Lengths, OfFilmsAreThoseOfTheCameraFile) {
+  std::ofstream(folder_.file("c.json"))
+      << R"({"film_width": 24, "frames": [{"frame": 1, "position": [0, 0, 10], "look_at": [0, 0, 0],)"
+         R"( "focal_length": 50, "f_stop": 0.1, "focus_distance": 5}]})";
+  const auto seen = [&](const std::string& options) {
+    const ProgramResult result = runProgram("render " + fog() + " --size 24x24 --samples 16 --quiet -o " +
+                                            folder_.file("a.exr") + " " + options);
+    EXPECT_EQ(result.exitCode, 0) << options << result.errors;
+    return readImage(folder_.file("a.exr")).channel("A").values;
+  };
+  const std::string typed =
+      "--camera-position 0,0,10 --look-at 0,0,0 --focal-length 50 --f-stop 0.1 --focus-distance 5 "
+      "--film-width ";
+  const std::string file = "--camera " + folder_.file("c.json");
+  const std::vector<float> own = seen(file), wide = seen(file + " --film-width 36");
+  EXPECT_EQ(own, seen(typed + "24"));
+  EXPECT_EQ(wide, seen(typed + "36"));
+  EXPECT_EQ(seen(file + " --focal-length 50"), own);
+  EXPECT_NE(own, wide);
+  EXPECT_NE(own, seen(file + " --lens-radius 0"));
+}
+
 // From the lowest point of the volume, as --flat-base counts.
 TEST_F(Lengths, OfTheGroundCountFromTheBottom) {
   const std::string ground = "--fov 25 --ground --samples 2 ";

@@ -122,7 +122,9 @@ TEST(Program, ValuesAreRefusedInOneForm) {
       {"render --aov Z,x", "--aov: got 'x', allowed: one of Z|"},
       {"look --show x", "--show: got 'x', allowed: one of cloud|surface|"},
       {"info --progress x", "--progress: got 'x', allowed: one of auto|alf"},
-      {"cloud a.obj -o a.vdb --layers 1 --layers 2", "--layers: is given 2 times, allowed: once"}};
+      {"cloud a.obj -o a.vdb --layers 1 --layers 2", "--layers: is given 2 times, allowed: once"},
+      {"render a.vdb -o a.exr --aerial-perspective --samples 1 --samples 2",
+       "--samples: is given 2 times, allowed: once"}};
   for (const auto& [line, said] : cases) {
     const ProgramResult result = runProgram(line);
     EXPECT_EQ(result.exitCode, 2) << line;

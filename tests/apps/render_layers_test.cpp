@@ -303,6 +303,8 @@ TEST_F(RenderLayers, MeshesAndLevelSetsAloneAreShadedQuickly) {
     std::string message;
   } cases[] = {{ball + " --checker 8", 1, "has no texture coordinates"},
                {ball + " --f-stop 2", 1, "without --f-stop"},
+               {ball + " --velocity-grid v --shutter 0,0.5", 2, "--velocity-grid"},
+               {ball + " --aerial-perspective", 2, "--aerial-perspective"},
                {folder.file("none.obj"), 1, "none.obj"},
                {fog() + " " + ball, 1, "is a mesh, not a density"}};
   for (const auto& c : cases) {
@@ -311,6 +313,36 @@ TEST_F(RenderLayers, MeshesAndLevelSetsAloneAreShadedQuickly) {
     EXPECT_EQ(result.exitCode, c.exitCode) << c.arguments << ": " << result.errors;
     EXPECT_NE(result.errors.find(c.message), std::string::npos) << c.arguments << ": " << result.errors;
   }
+}
+
+// Whichever grid comes first in the file.
+TEST_F(RenderLayers, TheGridThatIsAskedForIsTheOneThatIsShown) {
+  const TemporaryFolder folder;
+  const auto shape = bakeGrid(
+      sphere({0, 0, 0}, 0.5f),
+      {.voxelSize = 0.05f, .box = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}, .band = {-0.2f, 0.2f}});
+  const auto small = bakeGrid(
+      sphere({0, 0, 0}, 0.25f),
+      {.voxelSize = 0.05f, .box = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}, .band = {-0.2f, 0.2f}});
+  using Class = VdbGridInfo::Class;
+  writeVdbFile(folder.file("a.vdb"),
+               {toVdb(*shape, {"surface", Class::levelSet}), toVdb(*small, {"small", Class::levelSet}),
+                toVdb(*ball(0.5f, 0.05f), {"density", Class::fogVolume})},
+               {});
+  writeVdbFile(folder.file("b.vdb"), {toVdb(*ball(0.5f, 0.05f), {"density", Class::fogVolume})}, {});
+  const auto opaque = [&](const std::string& arguments) {
+    const ProgramResult result = runProgram("render " + arguments + " -o " + folder.file("a.exr") +
+                                            " --size 48x36 --camera-position 0,0,3 --quality draft --quiet");
+    EXPECT_EQ(result.exitCode, 0) << result.errors;
+    return readImage(folder.file("a.exr")).channel("R").values;
+  };
+  EXPECT_EQ(opaque(folder.file("a.vdb") + " --grid density"), opaque(folder.file("b.vdb")));
+  EXPECT_EQ(opaque(folder.file("a.vdb") + " --grid surface"), opaque(folder.file("a.vdb")));
+  EXPECT_NE(opaque(folder.file("a.vdb") + " --grid small"), opaque(folder.file("a.vdb")));
+  const ProgramResult none = runProgram("render " + folder.file("a.vdb") + " --grid none.at.all -o " +
+                                        folder.file("c.exr") + " --size 8x6 --quiet");
+  EXPECT_EQ(none.exitCode, 1);
+  EXPECT_NE(none.errors.find("none.at.all"), std::string::npos) << none.errors;
 }
 
 TEST_F(RenderLayers, ObjectsThatCannotBeAreRefused) {

@@ -139,7 +139,7 @@ TEST_F(WispsVerb, TakesColumnsOfTextAndVerticesAroundAVolume) {
 
 // The time of an expression is the frame, its seed is --seed.
 TEST_F(WispsVerb, ExpressionsOfVelocityKnowTimeAndSeed) {
-  const std::string still = " --amplitude 0 --displacement 0.01 --shutter 0.999,1 --guides 1 ";
+  const std::string still = " --amplitude 0 --displacement 0.01 --shutter 0.999,1 ";
   const std::string point = pointsFile("p.ply", {"0 0 0 0.25"}, "property float radius\n");
   ASSERT_EQ(wisps("w.####.vdb", point + kSmall + still + "--velocity '=(time,seed,0)' --seed 3 --frames 2-2")
                 .exitCode,
@@ -153,8 +153,7 @@ TEST_F(WispsVerb, ExpressionsOfVelocityKnowTimeAndSeed) {
 TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
   const auto error = [&](const std::string& name, const std::string& text) {
     std::ofstream(file(name)) << text;
-    const ProgramResult result =
-        wisps("w.vdb", file(name) + " --on vertices --guides 2 --dots 20 --resolution 8");
+    const ProgramResult result = wisps("w.vdb", file(name) + " --on vertices --dots 20 --resolution 8");
     EXPECT_EQ(result.exitCode, 1);
     return result.errors;
   };
@@ -169,13 +168,34 @@ TEST_F(WispsVerb, PointsThatCannotBeGuidesAreRefusedWithTheirFile) {
                   "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
                   "property float z\nproperty float radius\nend_header\n0 0 0 1\n1 0 0 -1\n"),
             line("sized.ply", "guides: vertex 1 has the size -1, which must be > 0 and finite"));
+  EXPECT_EQ(error("gap.csv", "x,y,z,pscale\n0,0,0,0.1\n1,0,0,0.1\n2,0,0,\n"),
+            line("gap.csv", "guides: vertex 2 has the size nan, which must be > 0 and finite"));
+  EXPECT_NE(error("away.csv", "x,y,z,pscale\n2000000,0,0,0.5\n")
+                .find(file("away.csv") + ": wisps reach as far as 2e+06 from the origin, with voxels of"),
+            std::string::npos);
+}
+
+// Options that another one decides are not passed over.
+TEST_F(WispsVerb, OptionsWithoutWhatTheyAreForAreRefused) {
+  const std::string points = pointsFile("p.ply", {"0 0 0 0.5"}, "property float radius\n");
+  EXPECT_NE(wisps("w.vdb", points + kSmall + "--guides 9").errors.find("--guides"), std::string::npos);
+  EXPECT_EQ(wisps("w.vdb", points + kSmall + "--velocity-grid v").exitCode, 2);
+}
+
+// Nothing but colours makes a grid of them.
+TEST_F(WispsVerb, WhiteGuidesOnSurfacesHaveNoColours) {
+  const ProgramResult result =
+      wisps("w.vdb", ownData("data/sphere_uv.obj") + kSmall + "--guides 50 --wisp-size 0.1");
+  ASSERT_EQ(result.exitCode, 0) << result.errors;
+  EXPECT_EQ(result.output.find("'Cd'"), std::string::npos) << result.output;
 }
 
 TEST_F(WispsVerb, ScattersGuidesOnAMeshAndInsideIt) {
   const std::string sphere = ownData("data/sphere_uv.obj");
-  const std::string tiny = sphere + " --guides 300 --dots 20 --wisp-size 0.001 --resolution 200 --points ";
+  const std::string tiny = sphere + " --dots 20 --wisp-size 0.001 --resolution 200 --points ";
   for (const std::string on : {"surface", "volume", "vertices"}) {
-    const ProgramResult result = wisps("w.vdb", tiny + file("dots.ply") + " --on " + on);
+    const ProgramResult result =
+        wisps("w.vdb", tiny + file("dots.ply") + " --on " + on + (on == "vertices" ? "" : " --guides 300"));
     ASSERT_EQ(result.exitCode, 0) << result.errors;
     // The sphere has radius 1; its triangles lie up to 2 % below, and an eighth of the ball within 1/2.
     int inner = 0;
@@ -236,7 +256,6 @@ TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {
       {one + " --wisp-size 1 --on surface", "has no faces"},
       {one + " --wisp-size 1 --on volume", "has no faces"},
       {"/nowhere/p.ply", "/nowhere/p.ply"},
-      {"--voxel-size 1e-6", "--voxel-size"},
       {"--guides 1000000 --dots 100000 --wisp-size 1000 --memory-limit 1G --voxel-size 0.01",
        "use larger voxels"},
       {kSmall + "--velocity /nowhere/v.vdb --shutter 0,1", "/nowhere/v.vdb"}};
@@ -245,6 +264,9 @@ TEST_F(WispsVerb, RefusesFilesThatHoldNoGuides) {
     EXPECT_EQ(result.exitCode, 1) << options;
     EXPECT_NE(result.errors.find(said), std::string::npos) << options << "\n" << result.errors;
   }
+  const ProgramResult small = wisps("w.vdb", "--voxel-size 1e-6");
+  EXPECT_EQ(small.exitCode, 2);
+  EXPECT_NE(small.errors.find("--voxel-size: wisps reach as far as 2.2"), std::string::npos) << small.errors;
   EXPECT_EQ(folder_.entryCount(), 4u);  // the files of points
 }
 

@@ -1,3 +1,4 @@
+import pathlib
 import pickle
 import types
 import unittest
@@ -104,6 +105,28 @@ class OtherLibraries(Case):
         mixed = types.SimpleNamespace(points=V, faces=np.array([3, 0, 1, 3, 4, 4, 6, 7, 5]))
         self.assertEqual(len(nephele.as_mesh(mixed)), 2)
 
+    def test_of_volumes_are_what_the_verb_makes(self):
+        fog = nephele.Grid(np.pad(np.random.default_rng(2).uniform(0, 1, (8, 8, 8)), 2), 0.1)
+        path = self.path("fog.vdb")
+        fog.save(path)
+        wanted = nephele.mesh(fog).volume
+        self.assertEqual(nephele.as_mesh(path).volume, wanted)
+        self.assertEqual(nephele.as_mesh(fog).volume, wanted)
+        nephele.write(self.path("both.vdb"), {"a": fog, "b": fog})
+        self.assertEqual(nephele.as_mesh(self.path("both.vdb")).volume, wanted)
+        nephele.Picture(np.zeros((4, 4, 3))).save(pathlib.Path(self.path("a.png")))
+        with self.assertRaisesRegex(nephele.Error, "a.png: "):
+            nephele.as_mesh(self.path("a.png"))
+
+    def test_names_and_faces_are_of_their_kind(self):
+        V, F = cube()
+        with self.assertRaisesRegex(TypeError, "the name of an attribute is a text, got 3"):
+            nephele.Mesh(V, F, {3: V[:, 0]})
+        with self.assertRaisesRegex(TypeError, "the name of a layer is a text, got 3"):
+            nephele.Picture(np.zeros((4, 4, 3)), {3: np.zeros((4, 4))})
+        with self.assertRaisesRegex(ValueError, "F: one row for each face"):
+            nephele.Mesh(V, [0, 1, 2])
+
     def test_like_open3d_and_pairs(self):
         V, F = cube()
         self.assertEqual(len(nephele.as_mesh(types.SimpleNamespace(vertices=V, triangles=F[:, :3]))), 6)
@@ -125,6 +148,20 @@ class Pickles(Case):
             self.assertEqual(again.groups, mesh.groups)
             for name, values in mesh.attributes.items():
                 np.testing.assert_array_equal(again.attributes[name], values)
+
+    def test_keep_what_belongs_to_corners(self):
+        # As many corners as vertices, which two arrays alone cannot tell.
+        path = self.path("a.obj")
+        with open(path, "w", encoding="ascii") as file:
+            file.write("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 3 0 1\n"
+                       "vt 0 0\nvt 1 0\nvt 1 1\ng a\nusemtl stone\nf 3/1 2/2 1/3\nf 7/3 6/2 5/1 4/2\n")
+        mesh = nephele.read(path)
+        mesh.save(self.path("b.obj"))
+        pickle.loads(pickle.dumps(mesh)).save(self.path("c.obj"))
+        with open(self.path("b.obj"), encoding="ascii") as b, open(self.path("c.obj"), encoding="ascii") as c:
+            text = b.read()
+            self.assertEqual(c.read(), text)
+        self.assertIn("usemtl stone", text)
 
 
 class WordsOfMeshes(Case):

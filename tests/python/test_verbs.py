@@ -133,7 +133,14 @@ class Objects(Case):
 
     def test_grow_wisps(self):
         wisps = nephele.wisps(nephele.ls2shape(BALL, 16), guides=4, dots=2000, resolution=40)
-        self.assertEqual(wisps.name if isinstance(wisps, nephele.Grid) else sorted(wisps)[0], "density")
+        self.assertEqual(wisps.name, "density")
+        disc = nephele.wisps(shape="disc", guides=4, dots=2000, resolution=40)
+        self.assertEqual(disc.name, "density")
+
+    def test_make_several_files_but_no_several_objects(self):
+        with self.assertRaisesRegex(TypeError, "'wedge' makes several files; give a path as 'surface'"):
+            nephele.cloud(nephele.Mesh(*cube()), resolution=16, layers=1, wedge="seed=1,2",
+                          output=self.path("c.vdb"), surface=True)
 
     def test_may_be_points(self):
         points = np.random.default_rng(1).uniform(0, 1, (3, 3))

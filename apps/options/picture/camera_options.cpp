@@ -88,7 +88,8 @@ void addLens(CLI::App& app, CameraOptions& options) {
   addOptional(app, "--focal-length", options.focalLength, 0.1, 1e5,
               "Focal length in millimetres, instead of --fov.")
       ->excludes(fov);
-  addNumber(app, "--film-width", options.filmWidth, 0.1, 1e5, "Width of the film in millimetres.");
+  addOptional(app, "--film-width", options.filmWidth, 0.1, 1e5, "Width of the film in millimetres.")
+      ->default_str(fmt::format("{:g}", kFilmWidth));
   addChoice<Camera::Projection>(
       app, "--projection", options.frame.projection,
       {{"perspective", Camera::Projection::perspective}, {"orthographic", Camera::Projection::orthographic}},
@@ -174,7 +175,10 @@ class Placement {
     if (options_.fovDegrees)
       frame.fovDegrees = float(*options_.fovDegrees);
     else if (options_.focalLength)
-      frame.fovDegrees = float(fovDegreesOf(*options_.focalLength, options_.filmWidth));
+      frame.fovDegrees = float(fovDegreesOf(*options_.focalLength, filmWidth(key)));
+    else if (key.fovDegrees && key.hasFocalLength && options_.filmWidth)
+      frame.fovDegrees = float(fovDegreesOf(
+          focalLengthOf(*key.fovDegrees, key.filmWidth.value_or(kFilmWidth)), *options_.filmWidth));
     else if (key.fovDegrees)
       frame.fovDegrees = float(*key.fovDegrees);
     else if (key.verticalFovDegrees) {
@@ -193,6 +197,10 @@ class Placement {
     // Of nothing, a percentage may be anything.
     const double side = options_.seen.longestSide;
     return option ? option->worldUnits(side > 0 ? side : 1) : ofFile;
+  }
+
+  double filmWidth(const CameraKey& key) const {
+    return options_.filmWidth.value_or(key.filmWidth.value_or(kFilmWidth));
   }
 
   // A camera that does not frame anything needs a width; all of a moving one's poses have the same.
@@ -215,7 +223,7 @@ class Placement {
     if (fStop) {
       if (camera.isOrthographic())
         refuse(key, "--f-stop", "an orthographic camera has no focal length; give --lens-radius");
-      radius = 1e-3 * focalLengthOf(double(frame.fovDegrees), options_.filmWidth) / (2 * *fStop);
+      radius = 1e-3 * focalLengthOf(double(frame.fovDegrees), filmWidth(key)) / (2 * *fStop);
     }
     if (radius == 0) return camera;
     const std::optional<double> focus = chosen(options_.focusDistance, key.focusDistance);

@@ -30,8 +30,7 @@ struct CameraOptions {
   /// This is one of many pictures, and the width of an orthographic one must not change.
   bool isOneOfMany = false;
   /// What is given here goes before what the file says. Focal length and film in millimetres.
-  std::optional<double> fovDegrees, focalLength;
-  double filmWidth = 36;
+  std::optional<double> fovDegrees, focalLength, filmWidth;
   /// Percentages are of the longest side of the volume, or of what is framed if it is empty.
   std::optional<Length> orthographicWidth, lensRadius;
   std::optional<double> fStop;

@@ -14,9 +14,9 @@
 namespace nephele::apps {
 namespace {
 
-Mesh readObject(const std::string& path) {
+Mesh readObject(const std::string& path, const std::string& name) {
   if (!isVolumeFile(path)) return readMesh(path);
-  const VdbGrid grid = readScalarGrid(path);
+  const VdbGrid grid = readScalarGrid(path, name);
   if (const VdbGridInfo info = describe(grid); info.gridClass != VdbGridInfo::Class::levelSet)
     throw Error(fmt::format("{}: grid '{}' is not a level set, which objects are", path, info.name));
   return namingFile(path, [&] { return marchingCubes(*toBricks(grid)); });
@@ -29,13 +29,16 @@ bool hasCoordinates(const Mesh& mesh) {
 }
 
 std::vector<SurfaceObject> painted(const ObjectOptions& options, const std::vector<std::string>& paths,
-                                   const Vec3f& colour, double mostBytes) {
+                                   const std::vector<std::string>& grids, const Vec3f& colour,
+                                   double mostBytes) {
   std::vector<SurfaceObject> result;
   const auto image = options.texture.empty() ? nullptr
                                              : std::make_shared<const Image>(readLinearImage(
                                                    options.texture, options.textureEncoding, mostBytes));
-  for (const std::string& path : paths) {
-    SurfaceObject object{readObject(path), options.colour.value_or(colour), options.checkers, image};
+  for (std::size_t i = 0; i != paths.size(); ++i) {
+    const std::string& path = paths[i];
+    SurfaceObject object{readObject(path, i < grids.size() ? grids[i] : ""), options.colour.value_or(colour),
+                         options.checkers, image};
     if (object.mesh.faceCount() == 0) throw Error(path + ": has no surface");
     if ((options.checkers > 0 || image) && !hasCoordinates(object.mesh))
       throw Error(fmt::format("{}: has no texture coordinates, which --{} needs", path,
@@ -87,8 +90,8 @@ void addObjectOptions(CLI::App& app, ObjectOptions& options) {
 std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volume, const Extent& seen,
                                                         double mostBytes) const {
   if (any()) require(!volume.isEmpty(), "objects and the ground stand in a volume that is not empty");
-  std::vector<SurfaceObject> all = painted(*this, objects, {0.5f, 0.5f, 0.5f}, mostBytes);
-  for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path), .isHoldout = true});
+  std::vector<SurfaceObject> all = painted(*this, objects, {}, {0.5f, 0.5f, 0.5f}, mostBytes);
+  for (const std::string& path : holdouts) all.push_back({.mesh = readObject(path, ""), .isHoldout = true});
   if (ground) {
     const Box& box = seen.box;
     const Length height = groundHeight.value_or(Length{0, true});
@@ -103,8 +106,9 @@ std::shared_ptr<const Surfaces> ObjectOptions::surfaces(const RenderVolume& volu
 }
 
 std::vector<SurfaceObject> ObjectOptions::shapes(const std::vector<std::string>& paths,
+                                                 const std::vector<std::string>& grids,
                                                  double mostBytes) const {
-  return painted(*this, paths, kShapeColour, mostBytes);
+  return painted(*this, paths, grids, kShapeColour, mostBytes);
 }
 
 void ObjectOptions::lift(CameraOptions& camera) const {

@@ -28,8 +28,10 @@ struct ObjectOptions {
   std::optional<Length> groundHeight;
   Vec3f groundColour{0.3f, 0.3f, 0.3f};
 
-  /// Of meshes and level sets that are the picture's only subject. @throws Error naming the file.
-  std::vector<SurfaceObject> shapes(const std::vector<std::string>& paths, double mostBytes) const;
+  /// Of meshes and level sets that are the picture's only subject, of files of grids the one of this name, or
+  /// else the first. @throws Error naming the file.
+  std::vector<SurfaceObject> shapes(const std::vector<std::string>& paths,
+                                    const std::vector<std::string>& grids, double mostBytes) const;
   bool any() const { return !objects.empty() || !holdouts.empty() || ground; }
   /// Reads the files, the ground under all that is `seen`; null where there are no objects. @throws Error
   /// naming the file.

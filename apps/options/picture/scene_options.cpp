@@ -55,7 +55,9 @@ bool SceneOptions::changesWithTime(const PictureOptions& picture) const {
 }
 
 Extent SceneOptions::measured(const PictureOptions& picture, Run& run) const {
-  if (!isScript(inputs) && areShapes(inputs)) return extentOfShapes(inputs, objects, run);
+  if (!isScript(inputs))
+    if (const auto grids = picture.volumes.seenGrids(inputs.size()); areShapes(inputs, grids))
+      return extentOfShapes(inputs, grids, objects, run);
   PictureOptions own = picture;
   const RenderVolume read = volume(own, run);
   Extent extent = extentOf(read);

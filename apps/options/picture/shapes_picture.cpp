@@ -30,24 +30,30 @@ void requireNothingOfVolumes(const CLI::App& app, const PictureOptions& options)
     throw CLI::ValidationError(option, "needs a volume; meshes and level sets alone are shown without it");
   };
   for (const char* option :
-       {"--deep", "--holdout", "--object", "--holdout-object", "--write-deep-shadow", "--volume-motion"})
+       {"--deep", "--holdout", "--object", "--holdout-object", "--write-deep-shadow", "--volume-motion",
+        "--color-grid", "--color", "--emission-grid", "--velocity-grid", "--velocity-scale",
+        "--display-server", "--aerial-perspective", "--integrator"})
     if (app.count(option) > 0) refuse(option);
   if (app.count("--aov") > 0 && options.render.aovs != std::vector<std::string>{"none"}) refuse("--aov");
 }
 
 }  // namespace
 
-Extent extentOfShapes(const std::vector<std::string>& inputs, const ObjectOptions& objects, const Run& run) {
-  return extentOf(objects.shapes(inputs, run.memoryLimitBytes));
+Extent extentOfShapes(const std::vector<std::string>& inputs, const std::vector<std::string>& grids,
+                      const ObjectOptions& objects, const Run& run) {
+  return extentOf(objects.shapes(inputs, grids, run.memoryLimitBytes));
 }
 
-bool areShapes(const std::vector<std::string>& paths) {
-  return std::ranges::all_of(paths, [](const std::string& path) {
-    if (isMeshFile(path)) return true;
-    for (const VdbGrid& grid : readVdbHeaders(path))
-      if (valuesOf(grid) == VdbValues::scalar) return labelOf(grid).gridClass == VdbGridInfo::Class::levelSet;
-    return false;
-  });
+bool areShapes(const std::vector<std::string>& paths, const std::vector<std::string>& grids) {
+  for (std::size_t i = 0; i != paths.size(); ++i) {
+    if (isMeshFile(paths[i])) continue;
+    const std::vector<VdbGrid> headers = readVdbHeaders(paths[i]);
+    const auto seen = std::ranges::find_if(headers, [&](const VdbGrid& grid) {
+      return valuesOf(grid) == VdbValues::scalar && (grids[i].empty() || labelOf(grid).name == grids[i]);
+    });
+    if (seen == headers.end() || labelOf(*seen).gridClass != VdbGridInfo::Class::levelSet) return false;
+  }
+  return true;
 }
 
 void writeShapesPicture(const CLI::App& app, const SceneOptions& scene, const PictureOptions& options,
@@ -55,7 +61,8 @@ void writeShapesPicture(const CLI::App& app, const SceneOptions& scene, const Pi
   requireNoSettings(scene.script);
   requireNothingOfVolumes(app, options);
   run.begin("read");
-  std::vector<SurfaceObject> shapes = scene.objects.shapes(scene.inputs, run.memoryLimitBytes);
+  std::vector<SurfaceObject> shapes = scene.objects.shapes(
+      scene.inputs, options.volumes.seenGrids(scene.inputs.size()), run.memoryLimitBytes);
   SurfacePictureOptions shown;
   shown.camera = options.placed(extentOf(shapes), run).camera();
   if (shown.camera->hasLens() || shown.camera->isMoving())

@@ -135,6 +135,14 @@ void requireScaledVelocity(const VolumeOptions& options) {
 
 }  // namespace
 
+std::vector<std::string> VolumeOptions::seenGrids(std::size_t files) const {
+  checkCount("--grid", densityGrids.size(), files);
+  std::vector<std::string> names(files);
+  for (std::size_t i = 0; i != files; ++i)
+    if (const std::string name = entryOf(densityGrids, i, std::string()); name != "none") names[i] = name;
+  return names;
+}
+
 void addVolumeOptions(CLI::App& app, VolumeOptions& options) {
   const auto addGrid = [&app](const std::string& name, std::vector<std::string>& target,
                               const std::string& text) {

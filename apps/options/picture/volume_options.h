@@ -30,6 +30,9 @@ struct VolumeOptions {
              velocityGrids.empty());
   }
   double velocityFactor() const { return velocityScale.value_or(1.0 / 24); }
+  /// The grids of so many files that are seen, "" where it is the first that holds numbers.
+  /// @throws Error where names are neither one for all nor one for each.
+  std::vector<std::string> seenGrids(std::size_t files) const;
 };
 
 /// Declares the options on `app`.

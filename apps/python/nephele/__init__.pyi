@@ -185,7 +185,7 @@ class Picture:
         is linear light behind what is not opaque.
         """
         ...
-    def save(self, path: str, *, view: str = 'filmic', exposure: float = 0.0, background: List[float[3]] = [0.10000000149011612, 0.17000000178813934, 0.2800000011920929]) -> None:
+    def save(self, path: Any, *, view: str = 'filmic', exposure: float = 0.0, background: List[float[3]] = [0.10000000149011612, 0.17000000178813934, 0.2800000011920929]) -> None:
         """Writes .exr (linear, all layers) or .png (for the screen)."""
         ...
 
@@ -373,7 +373,8 @@ def as_mesh(thing: Any) -> Mesh:
     """A Mesh of what other libraries hold: anything with vertices and faces (trimesh, open3d: triangles), points
     and
     faces (pyvista), a pair (V, F), an
-    array (n, 3) of points, or the path of a file. A Mesh is itself.
+    array (n, 3) of points, or the path of a file. A Mesh is itself; of volumes it is what the verb mesh
+    makes.
     """
     ...
 
@@ -957,7 +958,7 @@ def turntable(
     ...
 
 def wisps(
-    source: Any,
+    source: Any = ...,
     /,
     *,
     output: Optional[Path] = ...,
@@ -1008,8 +1009,8 @@ def wisps(
     memory_limit: Any = ...,
     overwrite: bool = ...,
 ) -> Any:
-    """Grows wisps of fine dots on guide points; returns the density as a Grid, or a dict of grids. points=True
-    returns the dots, too.
+    """Grows wisps of fine dots on guide points, or within shape=...; returns the density as a Grid, or a dict of
+    grids. points=True returns the dots, too.
 
     Options are those of `nephele wisps --help-all`, with underscores, and nephele.options("wisps") lists
     them: numbers,

@@ -73,13 +73,17 @@ def info(path):
 def as_mesh(thing):
     """A Mesh of what other libraries hold: anything with vertices and faces (trimesh, open3d: triangles), points and
     faces (pyvista), a pair (V, F), an
-    array (n, 3) of points, or the path of a file. A Mesh is itself."""
+    array (n, 3) of points, or the path of a file. A Mesh is itself; of volumes it is what the verb mesh makes."""
     import numpy
 
     if isinstance(thing, Mesh):
         return thing
+    if isinstance(thing, Grid) or isinstance(thing, PATHS) and _extension(os.fsdecode(thing)) in _VOLUMES:
+        from ._verbs import mesh
+
+        return mesh(thing)
     if isinstance(thing, PATHS):
-        return read(thing) if _extension(os.fsdecode(thing)) not in _VOLUMES else read(thing).mesh()
+        return _nephele._read_mesh(os.fsdecode(thing))
     if isinstance(thing, numpy.ndarray) and thing.ndim == 2:
         return Mesh(thing, numpy.zeros((0, 3), int))
     if isinstance(thing, (tuple, list)) and len(thing) == 2:
@@ -145,18 +149,12 @@ def _show(self):
     return None if picture is None else png(picture.screen())
 
 
-def _restored_mesh(V, corners, face_start, attributes, groups, name):
-    ends = face_start.tolist()
-    sides = {b - a for a, b in zip(ends, ends[1:])}
-    if len(sides) == 1:
-        faces = corners.reshape(-1, sides.pop())
-    else:
-        faces = [corners[a:b] for a, b in zip(ends, ends[1:])]
-    return Mesh(V, faces, attributes, groups=groups, name=name)
+def _mesh_of_state(*state):
+    return _nephele._mesh_of_state(state)
 
 
 def _reduced_mesh(self):
-    return _restored_mesh, (self.V, self.corners, self.face_start, self.attributes, self.groups, self.name)
+    return _mesh_of_state, _nephele._state_of_mesh(self)
 
 
 def _grid_of_state(*state):

@@ -104,7 +104,8 @@ class _Call:
         if isinstance(thing, Picture):
             return self._file(_nephele._file_of_picture(name, thing), name)
         if isinstance(thing, _FIELDS):
-            raise TypeError(f"{self.verb}: a grid is needed, not a field; field.bake makes one")
+            hint = "; field.bake makes one" if isinstance(thing, ScalarField) else ""
+            raise TypeError(f"{self.verb}: a grid is needed, not a field{hint}")
         return self._file(_nephele._file_of_mesh(name, as_mesh(thing)), name)
 
     def add_input(self, thing, name):
@@ -204,6 +205,8 @@ def _made(verb, inputs, extension, named, *, name="output", before=(), session=N
     others = {}
     for option, value in named.items():
         if value is True and option in _OUTPUTS and option in options(verb):
+            if several:
+                raise TypeError(f"{verb}: '{several}' makes several files; give a path as '{option}'")
             others[option] = call.room(option, _OUTPUTS[option], option.replace("_", "-"))
         else:
             call.add_option(option, value)
@@ -246,8 +249,8 @@ def advect(what, /, *arguments, **named):
     return _made("advect", [(what, "grid")], ".vdb", named, name="grids")
 
 
-def wisps(source, /, **named):
-    return _made("wisps", [(source, "points")], ".vdb", named, name="density")
+def wisps(source=None, /, **named):
+    return _made("wisps", [] if source is None else [(source, "points")], ".vdb", named, name="density")
 
 
 def mesh(what, /, **named):
@@ -328,7 +331,7 @@ _TEXTS = {
              "Grid. surface=True returns the level set, too.",
     "advect": "Carries a Grid, or a dict of them, along with a velocity. Given a field it is the word of Felt: "
               "advect(field, velocity, dt). map=True returns the map, too.",
-    "wisps": "Grows wisps of fine dots on guide points; returns the density as a Grid, or a dict of grids. points=True "
+    "wisps": "Grows wisps of fine dots on guide points, or within shape=...; returns the density as a Grid, or a dict of grids. points=True "
              "returns the dots, too.",
     "mesh": "Turns a level set or a density into a Mesh, or decimates, smooths and subdivides one.",
     "transform": "Moves, turns and scales a mesh or grids, or changes their up axis or unit.",

@@ -195,6 +195,13 @@ TEST(Points, AreReadFromText) {
   EXPECT_EQ(titled.attributes[1].name, "pscale");
   EXPECT_EQ(titled.attributes[1].values, (std::vector<float>{0.5f, 0.25f}));
   EXPECT_EQ(titled.attributes[2].name, "vx");
+  std::ofstream(folder.file("gaps.csv")) << "x,y,z,mass,name,none,size\n1,2,3,5,7,,1\n4,5,6,,wall,,inf\n";
+  const Mesh gaps = readPoints(folder.file("gaps.csv"));
+  EXPECT_EQ(gaps.positions, two);
+  ASSERT_EQ(gaps.attributes.size(), 2u) << "neither words nor nothing";
+  EXPECT_EQ(gaps.attributes[0].values[0], 5);
+  EXPECT_TRUE(std::isnan(gaps.attributes[0].values[1]));
+  EXPECT_TRUE(std::isnan(gaps.attributes[1].values[1]));
   for (const char* bad : {"1 2\n3 4\n", "1 2 3\n1 2 x\n", "1 2 3\n1 2 nan\n", "1 2 3\n1 2 3x\n", "title\n",
                           "", "1,,2,3\n", "1 2 nan\n1 2 3\n", "nan 0 0\n1 1 1\n", "-inf,0,0\n1,1,1\n",
                           "x 1e999 z\n1 1 1\n", "x,y,z,w\n1,2\n"}) {

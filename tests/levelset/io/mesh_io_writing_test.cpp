@@ -4,11 +4,13 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <tuple>
 
 #include "nephele/levelset/io/mesh_io.h"
 #include "nephele/modeling/base/error.h"
 #include "tests/support/mesh_attributes.h"
 #include "tests/support/run_program.h"
+#include "tests/support/test_meshes.h"
 
 namespace nephele {
 namespace {
@@ -203,6 +205,43 @@ TEST(MeshIo, PlyHasNoTwoPropertiesOfOneName) {
     ASSERT_NE(attribute, nullptr) << name;
     EXPECT_EQ(attribute->values, mesh.attributes[k++].values) << name;
   }
+}
+
+TEST(MeshIo, PlyKeepsNamesThatWouldMeanSomethingElse) {
+  const TemporaryFolder folder;
+  Mesh mesh = decorated();
+  std::erase_if(mesh.attributes, [](const MeshAttribute& a) { return a.name == "uv" || a.name == "color"; });
+  const auto add = [&](const char* name) {
+    mesh.attributes.push_back({name, MeshAttribute::Domain::vertex, 1,
+                               std::vector<float>(mesh.positions.size(), float(mesh.attributes.size()))});
+  };
+  const std::size_t first = mesh.attributes.size();
+  for (const char* name : {"s", "t", "x", "x_2", "red", "green", "blue", "alpha"}) add(name);
+  writeMesh(folder.file("a.ply"), mesh);
+  const Mesh back = readMesh(folder.file("a.ply"));
+  EXPECT_EQ(find(back, "uv"), nullptr);
+  EXPECT_EQ(find(back, "color"), nullptr);
+  std::size_t k = first;
+  for (const char* name : {"s_2", "t_2", "x_3", "x_2", "red_2", "green_2", "blue_2", "alpha"}) {
+    const MeshAttribute* attribute = find(back, name);
+    ASSERT_NE(attribute, nullptr) << name;
+    EXPECT_EQ(attribute->values, mesh.attributes[k++].values) << name;
+  }
+}
+
+TEST(MeshIo, ObjEndsGroupsWhereTheyEnd) {
+  const TemporaryFolder folder;
+  Mesh mesh = test::octahedron();
+  mesh.groups = {{"a", 0, 2, "stone"}, {"b", 5, 1, ""}};
+  writeMesh(folder.file("a.obj"), mesh);
+  const std::vector<MeshGroup> groups = readMesh(folder.file("a.obj")).groups;
+  ASSERT_EQ(groups.size(), 4u);
+  const std::tuple<const char*, std::uint32_t, std::uint32_t, const char*> expected[] = {
+      {"a", 0, 2, "stone"}, {"default", 2, 3, ""}, {"b", 5, 1, ""}, {"default", 6, 2, ""}};
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_EQ(std::tie(groups[i].name, groups[i].firstFace, groups[i].faceCount, groups[i].material),
+              expected[i])
+        << i;
 }
 
 TEST(MeshIo, ObjKeepsFacesAfterNamesThatEndInBackslashes) {

@@ -125,6 +125,18 @@ TEST(ExactDistance, RangesContainTheValues) {
   }
 }
 
+// From afar floats cannot tell the sides of a plate apart, but all that is outside of its box is outside of
+// it.
+TEST(ExactDistance, HasNoInsideOutsideOfTheBox) {
+  const ExactDistance plate(test::boxMesh({0, 0, 0}, {1, 1, 1e-4}));
+  EXPECT_NEAR(plate.at({0.3, 0.4, 5e-5}).distance, 5e-5, 1e-12);
+  for (const double z : {2000.0, -2000.0, 1e5, 1e9}) {
+    const ExactDistance::Hit hit = plate.at({0.3, 0.4, z});
+    EXPECT_NEAR(hit.distance / -std::abs(z), 1, 1e-6) << z;
+    EXPECT_NEAR(hit.gradient.z, z > 0 ? -1 : 1, 1e-6) << z;
+  }
+}
+
 TEST(ExactDistance, IsNanWhereThePointIs) {
   const auto distance = std::make_shared<ExactDistance>(test::icosphere(1, 1));
   const float nan = std::nanf("");

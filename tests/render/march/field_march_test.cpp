@@ -195,6 +195,15 @@ TEST(FieldMarch, BallTransmitsByTheIntegralOfItsDensity) {
   }
 }
 
+// The least numbers that floats hold times a length are 0, and nothing is opaque for it.
+TEST(FieldMarch, TheLeastDensitiesAreNotOpaque) {
+  const RenderVolume volume = gridless(exp(square(component(position(), 1) * (1 / 0.035f)) * -1.0f), 0.02f);
+  const Camera camera = Camera::lookingAt({0, 3.2f, 5.6f}, {0, 0, 0}, {0, 1, 0}, {64, 48});
+  const Image image = renderImage(volume, medium(20), kLights, camera, options()).image;
+  // A slanted line through the sheet, whose integral is sqrt(pi) 0.035 over the sine of its elevation.
+  for (const float alpha : image.channel("A").values) EXPECT_LT(alpha, 0.97f);
+}
+
 TEST(FieldMarch, AgreesWithTheGridOnASmoothDensity) {
   // A bell of half a unit, which voxels of a tenth of that hold to some 1e-3 of its height.
   const ScalarField bell = exp(dot(position(), position()) * -4.0f) - 0.01f;

@@ -350,6 +350,8 @@ TEST(NearLights, RefuseWhatIsAbsurd) {
       refused([](Lights& l) { l.locals[0].cone->penumbraDegrees = 26; }, "point: expected a penumbra"));
   EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = "sun"; }, "'sun' is taken twice"));
   EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = "a.b"; }, "got 'a.b'"));
+  EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = "air"; }, "'air' is that of a layer"));
+  EXPECT_TRUE(refused([](Lights& l) { l.locals[0].name = std::string(201, 'a'); }, "at most 200 bytes"));
   EXPECT_TRUE(refused([](Lights& l) { l.locals.resize(9); }, "at most 8"));
 }
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "nephele/modeling/base/error.h"
 #include "nephele/modeling/field/operations.h"
 #include "nephele/modeling/field/space.h"
 
@@ -64,6 +65,8 @@ TEST(BlackBody, IsAFieldOfATemperature) {
   }
   EXPECT_EQ(glow({9, 0, 0}), glow({4, 0, 0}));
   EXPECT_EQ(glow({-1, 0, 0}), Vec3f{});
+  EXPECT_EQ(BlackBodyColours(6500)(NAN), Vec3f{});
+  EXPECT_THROW(blackBody(component(position(), 0), NAN), Error);
   EXPECT_EQ(glow.range({{-2, 0, 0}, {0, 1, 1}})[0], Interval::of(0));
 }
 

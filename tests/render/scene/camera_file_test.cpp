@@ -145,7 +145,7 @@ void expectSame(const CameraMotion& a, const CameraMotion& b) {
     EXPECT_EQ(k.target.has_value(), l.target.has_value());
     for (const auto member :
          {&CameraKey::fovDegrees, &CameraKey::verticalFovDegrees, &CameraKey::orthographicWidth,
-          &CameraKey::fStop, &CameraKey::lensRadius, &CameraKey::focusDistance}) {
+          &CameraKey::fStop, &CameraKey::lensRadius, &CameraKey::focusDistance, &CameraKey::filmWidth}) {
       ASSERT_EQ((k.*member).has_value(), (l.*member).has_value());
       EXPECT_NEAR((k.*member).value_or(0), (l.*member).value_or(0), 1e-9);
     }

@@ -243,6 +243,8 @@ TEST(Environment, RefusesWhatIsNoMap) {
   EXPECT_THROW(Environment(4, 2, std::vector<Vec3f>(6)), Error);
   EXPECT_THROW(Environment(2, 1, {{NAN, 0, 0}, {}}), Error);
   EXPECT_THROW(Environment(2, 1, {{}, {}}, {0, -1}), Error);
+  EXPECT_THROW(Environment(2, 1, {{3e38f, 0, 0}, {}}, {0, 10}), Error);
+  EXPECT_TRUE(Environment(2, 1, {{1, 1, 1}, {}}).around({}).empty());
   EXPECT_THROW(Environment(2, 1, {{}, {}}, {INFINITY, 1}), Error);
   EXPECT_THROW(Environment::read("/nowhere/sky.exr"), Error);
   const auto path = std::filesystem::temp_directory_path() / "nephele_environment_test.hdr";
