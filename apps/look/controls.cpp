@@ -139,7 +139,8 @@ const std::set<std::string> kNotShown{"size",          "crop",
                                       "cache",         "cache-size",
                                       "half",          "holdout",
                                       "spp",           "noise-speed",
-                                      "noise-period",  "detail"};
+                                      "noise-period",  "detail",
+                                      "from",          "to"};
 
 bool isField(const OptionRow& option) {
   return option.type.ends_with("|FIELD");

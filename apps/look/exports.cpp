@@ -127,6 +127,29 @@ std::string LookExports::recipe() const {
   return text;
 }
 
+namespace {
+
+/// The same text, as long, with blanks for comments.
+std::string withoutComments(std::string text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') {
+      for (++i; i < text.size() && text[i] != '"' && text[i] != '\n'; ++i)
+        if (text[i] == '\\') ++i;
+      continue;
+    }
+    const std::string_view rest = std::string_view(text).substr(i);
+    if (!rest.starts_with("//") && !rest.starts_with("/*")) continue;
+    const std::size_t found = rest.starts_with("//") ? rest.find('\n') : rest.find("*/", 2);
+    const std::size_t end = found == rest.npos ? text.size() : i + found + (rest.starts_with("//") ? 0 : 2);
+    for (; i < end; ++i)
+      if (text[i] != '\n') text[i] = ' ';
+    --i;
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string LookExports::script() const {
   std::ifstream file(subject.path, std::ios::binary);
   require(file.good(), subject.path + ": cannot be read");
@@ -138,15 +161,16 @@ std::string LookExports::script() const {
     // param TYPE NAME = VALUE, up to the range, the text or the end of the statement.
     const std::regex declared("(\\bparam\\s+([A-Za-z]+(?:\\s*\\[\\s*\\])?)\\s+" + name +
                               "\\s*=\\s*)((?:\"[^\"]*\"|\\([^;]*?\\)|[^;\"]*?))(\\s*(?:\\bin\\b|;|\"))");
+    const std::string code = withoutComments(text);
     std::smatch found;
-    if (!std::regex_search(text, found, declared)) continue;
+    if (!std::regex_search(code, found, declared)) continue;
     if (found[2] == "string" && !set.starts_with('"')) set = quotedText(set);
-    text = found.prefix().str() + found[1].str() + set + found[4].str() + found.suffix().str();
+    text.replace(std::size_t(found.position(3)), std::size_t(found.length(3)), set);
   }
   return text;
 }
 
-nlohmann::json savedLooks() {
+nlohmann::json savedLooks(const LookSubject& subject) {
   auto looks = nlohmann::json::array();
   std::error_code error;
   std::vector<std::filesystem::path> paths;
@@ -159,8 +183,13 @@ nlohmann::json savedLooks() {
   std::ranges::sort(paths);
   for (const auto& path : paths) try {
       std::ifstream file(path);
-      looks.push_back(
-          {{"name", path.stem().string()}, {"settings", checkedSettings(nlohmann::json::parse(file))}});
+      LookSettings settings = checkedSettings(nlohmann::json::parse(file));
+      // What belongs to another shape.
+      for (const char* name : {"species", "shape-seed", "shape-size"})
+        if (!subject.path.empty()) settings["cloud"].erase(name);
+      for (const char* name : {"combine", "blend", "repair", "subdivide"})
+        if (subject.path.empty()) settings["cloud"].erase(name);
+      looks.push_back({{"name", path.stem().string()}, {"settings", std::move(settings)}});
     } catch (const std::exception&) {
       // Somebody else's file.
     }

@@ -31,8 +31,9 @@ struct LookExports {
   std::string script() const;
 };
 
-/// Where looks are saved by name: settings that the user has kept. @throws Error where that cannot be.
-nlohmann::json savedLooks();
+/// Where looks are saved by name: settings that the user has kept, without what belongs to another shape than
+/// `subject`. @throws Error where that cannot be.
+nlohmann::json savedLooks(const LookSubject& subject);
 void saveLook(const std::string& name, const LookSettings& settings);
 
 /// `name` if it can be the name of a file in a folder, with one of `extensions`. @throws LookFault.

@@ -110,6 +110,7 @@ int LookJobs::runLine(int id, const std::vector<std::string>& line,
   if (pipe(ends) != 0) return 1;
   std::vector<std::string> words{"nephele"};
   words.insert(words.end(), line.begin(), line.end());
+  words.insert(words.end(), limits_.begin(), limits_.end());
   words.insert(words.end(), {"--progress", "alf"});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());

@@ -14,8 +14,9 @@ namespace nephele::apps {
 /// write and how they end is as ever.
 class LookJobs {
  public:
-  /// `tell` takes messages {"type": "job", ...} from other threads.
-  explicit LookJobs(std::function<void(const nlohmann::json&)> tell) : tell_(std::move(tell)) {}
+  /// `tell` takes messages {"type": "job", ...} from other threads; every line ends with `limits`.
+  LookJobs(std::function<void(const nlohmann::json&)> tell, std::vector<std::string> limits)
+      : tell_(std::move(tell)), limits_(std::move(limits)) {}
   /// Stops all, which leave no partial output.
   ~LookJobs();
   LookJobs(const LookJobs&) = delete;
@@ -41,6 +42,7 @@ class LookJobs {
               std::string& last);
 
   std::function<void(const nlohmann::json&)> tell_;
+  std::vector<std::string> limits_;
   std::mutex mutex_;
   std::map<int, Job> jobs_;
   int last_ = 0;

@@ -129,7 +129,7 @@ class HttpServer final : public LookServer {
   LookEngine engine_;
   LookJobs jobs_;
   // The last request of each page, to be made again where files change.
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::map<std::string, LookRequest> latest_;
   httplib::Server server_;
   std::thread thread_;
@@ -139,7 +139,7 @@ HttpServer::HttpServer(const LookServerOptions& options)
     : options_(options),
       word_(randomWord()),
       engine_(options.memoryLimitBytes),
-      jobs_([this](const nlohmann::json& message) { engine_.tell(message); }) {
+      jobs_([this](const nlohmann::json& message) { engine_.tell(message); }, options.limits) {
   server_.new_task_queue = [] { return new httplib::ThreadPool(kMostThreads); };
   server_.set_payload_max_length(kMostBytes);
   server_.set_read_timeout(5);
@@ -291,7 +291,7 @@ nlohmann::json HttpServer::controls() const {
           {"groups", lookControls(subject)},
           {"parameters", lookParameters(subject)},
           {"looks", shippedLooks(subject)},
-          {"saved", savedLooks()}};
+          {"saved", savedLooks(subject)}};
 }
 
 nlohmann::json HttpServer::setSettings(const nlohmann::json& body) {
@@ -334,7 +334,7 @@ nlohmann::json HttpServer::recipe(const nlohmann::json& body) {
 
 nlohmann::json HttpServer::saveLook(const nlohmann::json& body) {
   apps::saveLook(body.value("name", ""), planOf(options_.subject, body)->settings);
-  return {{"saved", savedLooks()}};
+  return {{"saved", savedLooks(options_.subject)}};
 }
 
 nlohmann::json HttpServer::startJob(const nlohmann::json& body) {
@@ -397,10 +397,14 @@ std::vector<std::string> HttpServer::watched() const {
   std::vector<std::string> files;
   for (const std::string* path : {&options_.subject.path, &options_.subject.reference})
     if (!path->empty()) files.push_back(*path);
-  for (const char* name : {"recipe", "texture"})
-    for (const char* verb : {"cloud", "transfer", "render"})
-      if (options_.settings[verb].contains(name))
-        files.push_back(options_.settings[verb][name].get<std::string>());
+  const auto add = [&](const LookSettings& settings) {
+    for (const char* name : {"recipe", "texture"})
+      for (const char* verb : {"cloud", "transfer", "render"})
+        if (settings[verb].contains(name)) files.push_back(settings[verb][name].get<std::string>());
+  };
+  add(options_.settings);
+  const std::lock_guard lock(mutex_);
+  for (const auto& [page, request] : latest_) add(request.plan->settings);
   return files;
 }
 

@@ -22,6 +22,8 @@ struct LookServerOptions {
   /// Where files are written.
   std::string folder = ".";
   double memoryLimitBytes = 0;
+  /// Options of the program that hold for the files that the page asks for, too: --memory-limit, --threads.
+  std::vector<std::string> limits;
   std::string version;
 };
 

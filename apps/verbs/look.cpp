@@ -9,6 +9,7 @@
 #include "apps/look/files_watch.h"
 #include "apps/look/line.h"
 #include "apps/look/server.h"
+#include "apps/options/outputs.h"
 
 namespace nephele::apps {
 namespace {
@@ -65,6 +66,9 @@ void look(const LookArguments& options, Run& run) {
   server.port = options.port;
   server.folder = options.folder;
   server.memoryLimitBytes = run.memoryLimitBytes;
+  for (const std::string name : {"--memory-limit", "--threads"})
+    if (const std::string value = givenValue(*options.app, name); !value.empty())
+      server.limits.push_back(name + "=" + value);
   server.version = NEPHELE_VERSION;
   const std::unique_ptr<LookServer> page = makeLookServer(server);
   if (page->port() != options.port)
@@ -76,11 +80,13 @@ void look(const LookArguments& options, Run& run) {
   std::fflush(stdout);
   if (!options.hasNoBrowser) openBrowser(page->address());
   FilesWatch files;
-  files.watch(page->watched());
   constexpr int kBetweenLooks = 100;
-  while (!run.cancelled())
+  while (!run.cancelled()) {
+    // The page may have named others.
+    files.watch(page->watched());
     if (const std::vector<std::string> changed = files.wait(kBetweenLooks); !changed.empty())
       page->changed(changed);
+  }
 }
 
 }  // namespace

@@ -663,10 +663,13 @@ TEST(LookVerb, GivesBackACloudOfItsOwn) {
 
 TEST(LookVerb, PutsParametersIntoTheirPlaceInAScript) {
   const test::TemporaryFolder folder;
-  std::ofstream(folder.file("s.felt")) << "param float size = 0.5 in [0.1, 2] \"of the ball\";\n"
-                                          "param string kind = \"perlin\" in [\"perlin\", \"worley\"];\n"
-                                          "scalarfield density = clamp((sphere((0, 0, 0), size) + 0.1 * "
-                                          "noise(kind, frequency = 3)) * 20, 0, 1);\n";
+  std::ofstream(folder.file("s.felt"))
+      << "// To try: param float size = 2 is large.\n"
+         "/* param float size = 3; */ param float size = 0.5 in [0.1, 2] \"of the "
+         "ball\";\n"
+         "param string kind = \"perlin\" in [\"perlin\", \"worley\"];\n"
+         "scalarfield density = clamp((sphere((0, 0, 0), size) + 0.1 * "
+         "noise(kind, frequency = 3)) * 20, 0, 1);\n";
   const Viewer viewer({folder.file("s.felt")});
   const Json controls = Json::parse(viewer.client().Get((viewer.base() + "controls").c_str())->body);
   ASSERT_EQ(controls["parameters"].size(), 2u) << controls.dump();
@@ -676,7 +679,10 @@ TEST(LookVerb, PutsParametersIntoTheirPlaceInAScript) {
   const Json recipe = Json::parse(viewer.post("recipe", body)->body);
   EXPECT_NE(recipe["text"].get<std::string>().find("param string kind = \"worley\" in"), std::string::npos)
       << recipe;
-  EXPECT_NE(recipe["text"].get<std::string>().find("param float size = 0.75 in [0.1, 2]"), std::string::npos)
+  EXPECT_EQ(recipe["text"].get<std::string>().find(
+                "// To try: param float size = 2 is large.\n/* param float size = 3; "
+                "*/ param float size = 0.75 in [0.1, 2]"),
+            0u)
       << recipe;
   const auto all = viewer.messages(
       "a", [&] { EXPECT_EQ(viewer.post("settings", body)->status, 200); }, isFinal);

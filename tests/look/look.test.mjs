@@ -252,6 +252,27 @@ describe("a cloud", () => {
     await look.finished();
   });
 
+  test("lets go what needs what is taken away, and keeps defaults that are typed", kLimit, async (t) => {
+    const { look } = await cloud(t);
+    const { x, y } = await look.middle("#picture");
+    await look.drag({ x, y }, { x: x + 60, y });
+    await look.finished();
+    await look.type("#render-view", "90,10");
+    await look.finished();
+    assert.equal(await look.tab.$eval("#banner", (banner) => banner.hidden), true);
+    assert.equal(await look.value("#render-look-at"), "");
+    const isSet = () => look.tab.$eval("[data-name=amplitude]", (control) => control.classList.contains("changed"));
+    assert.equal(await isSet(), false);
+    await look.type("#cloud-amplitude", "3%");
+    await look.type("#cloud-amplitude", "2.5%");
+    await look.finished();
+    assert.equal(await isSet(), true);
+    const label = await look.middle("[data-name=amplitude] label");
+    await look.tab.mouse.click(label.x, label.y, { count: 2 });
+    await look.finished();
+    assert.equal(await isSet(), false);
+  });
+
   test("is the same behind its link, and other pages stay apart", kLimit, async (t) => {
     const { look, program } = await cloud(t);
     await look.type("#cloud-amplitude", "6");
@@ -404,6 +425,10 @@ scalarfield density = mask(sphere((0, 0, 0), size) + 0.2 * perlin(3, 1), 0.1);
     writeFileSync(path, kScript);
     const program = await startProgram(t, ["ball.felt", "--quality", "draft"], folder);
     const look = await LookPage.open(t, browser, program.address);
+    await look.type("#parameters-size", "5");
+    await look.says("#banner", /may be from 0.3 to 2/);
+    await new Promise((done) => setTimeout(done, 500));
+    assert.match(await look.text("#banner"), /may be from 0.3 to 2/);
     await look.type("#parameters-size", "0.5");
     await look.finished();
     const good = await look.small();

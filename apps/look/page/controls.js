@@ -160,8 +160,8 @@ class Control {
     if (color) color.value = toHex(shown) ?? toHex(control.default) ?? "#808080";
     if (range) {
       const number = numberOf(shown);
-      const fits = number && (number.unit === control.unit || number.unit === "" || !isTyped(control.unit));
-      this.#value.classList.toggle("long", !number && given !== undefined);
+      const fits = number && this.#fits(number);
+      this.#value.classList.toggle("long", !fits && given !== undefined);
       range.value = toSlider(fits ? number.number : control.low, control);
       range.style.setProperty("--fill", `${range.value / 10}%`);
       range.setAttribute("aria-valuetext", String(shown));
@@ -180,9 +180,15 @@ class Control {
     return /[; ]/.test(standard ?? "") && type !== "vector" && type !== "color" ? "" : (standard ?? "");
   }
 
+  /** Whether a number is in the unit of the control: of lengths in world units nothing is known here. */
+  #fits({ number, unit }) {
+    return unit === this.control.unit || !isTyped(this.control.unit) || number === 0;
+  }
+
   #flat() {
     const { control } = this;
-    return numberOf(this.#settings.get(control.verb, control.name))?.number ?? numberOf(control.default)?.number ?? control.low ?? 1;
+    const given = numberOf(this.#settings.get(control.verb, control.name));
+    return (given && this.#fits(given) ? given.number : numberOf(control.default)?.number) ?? control.low ?? 1;
   }
 
   #put(value, hurry = false) {
@@ -257,8 +263,12 @@ class Control {
       const way = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageUp: 5, PageDown: -5 }[event.key];
       if (!way) return;
       event.preventDefault();
-      const least = control.step && !control.logarithmic ? (1000 * control.step) / (control.high - control.low) : 0;
-      const place = Math.min(1000, Math.max(0, Number(range.value) + way * Math.max(10, least)));
+      const now = numberOf(this.#settings.get(control.verb, control.name) ?? this.#standard())?.number;
+      // Beyond the slider's end there is nowhere to go.
+      if (way > 0 ? now >= control.high : now <= control.low) return;
+      let place = Number(range.value);
+      do place = Math.min(1000, Math.max(0, place + way * 10));
+      while (place > 0 && place < 1000 && fromSlider(place, control) === now);
       this.#put(textOf(fromSlider(place, control), control));
     });
     this.#parts.range = range;
@@ -286,8 +296,8 @@ class Control {
       const typed = text.value.trim();
       const bare = numberOf(typed);
       const value = bare && bare.unit === "" && isTyped(control.unit) && this.#parts.range ? typed + control.unit : typed;
-      const isDefault = value === "" || value === control.default;
-      if (value !== String(this.#settings.get(control.verb, control.name) ?? "")) this.#put(isDefault ? undefined : value);
+      // The printed default, too, is said where it is typed: a quality or a look may say something else.
+      if (value !== String(this.#settings.get(control.verb, control.name) ?? "")) this.#put(value || undefined);
     };
     text.addEventListener("change", () => {
       take();

@@ -33,6 +33,8 @@ startTheme(() => picture.draw());
 let isLoaded = false;
 let fragment = "";
 let settled = 0;
+// The last of which something is wrong.
+let failed = -1;
 // Ends once the picture that came last is on the canvas, or was overtaken.
 let shown = Promise.resolve();
 
@@ -116,6 +118,7 @@ function take({ message, payload }) {
       sender.seen(message.revision);
       settle();
       byId("stage-text").textContent = "Not made";
+      failed = message.revision;
       showErrors([{ verb: message.verb, option: message.option, message: message.message, text: message.text }]);
       break;
     case "file":
@@ -144,7 +147,7 @@ async function takePicture(message, payload) {
   byId("picture").dataset.revision = message.revision;
   facts(message);
   if (settled !== message.revision) byId("stage-text").textContent = message.final ? "Final" : labelOf(message.stage);
-  dome.update(message.camera);
+  dome.update(message);
   listLayers(message.layers);
 }
 
@@ -176,7 +179,8 @@ function listLayers(layers) {
 
 function showErrors(errors) {
   const left = controls.showErrors(errors);
-  if (left.length) say(left.map((error) => error.message).join("\n"), { more: errors[0].text ?? "", key: "error" });
+  const [first, ...rest] = left.map((error) => error.message).join("\n").split("\n");
+  if (left.length) say(first, { more: rest.join("\n") || (errors[0].text ?? ""), key: "error" });
   else if (errors[0]?.text) say(errors[0].message, { more: errors[0].text, key: "error" });
   else unsay("error");
 }
@@ -185,7 +189,7 @@ function showErrors(errors) {
 
 function update() {
   controls.update();
-  dome.update(picture.message?.camera);
+  dome.update(picture.message);
   byId("what").value = settings.show.what;
   byId("layer").value = settings.show.layer;
   byId("layer").disabled = !isLit(settings.show.what);
@@ -210,7 +214,8 @@ settings.addEventListener("change", ({ detail }) => {
 });
 
 sender.addEventListener("taken", () => {
-  showErrors([]);
+  // What is wrong with it may be known before its answer has come.
+  if (failed !== sender.revision) showErrors([]);
   if (settled === sender.revision) settle();
 });
 sender.addEventListener("refused", ({ detail }) => {

@@ -45,6 +45,11 @@ const kKindsOf = {
 };
 const kWords = { exr: "EXR picture", png: "PNG preview", vdb: "Volume", turntable: "Turntable", script: "Script", pieces: "Pieces", mesh: "Mesh" };
 
+// What files and command lines show otherwise than the page.
+const kOfTheCloud = "These make the cloud in its light, not this view of it.";
+const kOfShapes = "These look from where View says, through a lens of their own, without the exposure.";
+const kDifferences = { surface: kOfTheCloud, checker: kOfTheCloud, pieces: kOfShapes, transfer: kOfShapes };
+
 /** The dialog for what comes out: command lines, recipes, and files that the program writes. */
 export class Outputs {
   #settings;
@@ -100,6 +105,7 @@ export class Outputs {
     try {
       const { settings, size, show } = this.#body();
       this.#offer(kKindsOf[show.what] ?? kKinds);
+      this.#say(kDifferences[show.what] ?? "");
       // The same frame as the one that is seen.
       for (const input of document.querySelectorAll("#jobs-new [data-size]")) input.value = size[0] > 640 ? size.join("x") : `1280x${2 * Math.round((640 * size[1]) / size[0])}`;
       this.#lines = (await post("command", { settings, size, show })).lines;
@@ -132,7 +138,11 @@ export class Outputs {
     start.addEventListener("click", async () => {
       byId("out-error").textContent = "";
       const { settings, size, show } = this.#body();
-      const typed = /^(\d+)x(\d+)$/.exec(second.value ?? "");
+      const typed = /^\s*(\d+)\s*[x×]\s*(\d+)\s*$/.exec(second.value ?? "");
+      if ("size" in second.dataset && !typed) {
+        byId("out-error").textContent = `${kind.title}: got '${second.value}' as the size, allowed: WIDTHxHEIGHT`;
+        return;
+      }
       const body = { page: kPage, what: kind.what, file: file.value.trim(), settings, show, size: typed ? [Number(typed[1]), Number(typed[2])] : size };
       if (kind.what === "turntable") body.frames = second.value.trim();
       try {

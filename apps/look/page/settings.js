@@ -2,6 +2,9 @@ export const clone = (value) => JSON.parse(JSON.stringify(value));
 const empty = () => ({ cloud: {}, wisps: {}, cut: {}, transfer: {}, render: {}, parameters: {} });
 const whole = (settings) => ({ ...empty(), ...clone(settings ?? {}) });
 
+// Of options that have no controls.
+const kNeeds = { render: { frame: ["camera"], "rotation-order": ["camera"] } };
+
 /**
  * What is looked at: settings of the verbs and what of the picture is shown. "change" is sent for each change, with `hurry` while
  * something is dragged.
@@ -16,7 +19,7 @@ export class Settings extends EventTarget {
     return this.values[verb][name];
   }
 
-  /** Sets values, of which undefined is the default; those that exclude them go. */
+  /** Sets values, of which undefined is the default; those that exclude them go, and those that need what goes. */
   set(verb, values, hurry = false) {
     const own = this.values[verb];
     for (const [name, value] of Object.entries(values)) {
@@ -27,7 +30,7 @@ export class Settings extends EventTarget {
       own[name] = value;
       for (const other of this.table[verb][name]?.excludes ?? []) delete own[other];
     }
-    if ("projection" in values && own.projection !== "orthographic") delete own["orthographic-width"];
+    this.#dropUnfounded(verb);
     this.#changed(hurry);
   }
 
@@ -49,6 +52,15 @@ export class Settings extends EventTarget {
 
   copy() {
     return clone(this.values);
+  }
+
+  /** Takes away what needs something that is not there. */
+  #dropUnfounded(verb) {
+    const own = this.values[verb];
+    const needsOf = (name) => kNeeds[verb]?.[name] ?? this.table[verb][name]?.needs ?? [];
+    const isUnfounded = (name) => needsOf(name).some((other) => own[other] === undefined);
+    if (verb === "render" && own.projection !== "orthographic") delete own["orthographic-width"];
+    for (let name; (name = Object.keys(own).find(isUnfounded)); ) delete own[name];
   }
 
   #changed(hurry) {

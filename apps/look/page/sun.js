@@ -12,6 +12,8 @@ export class SunDome {
   #commit;
   #default = "90,38";
   #turn = 0;
+  // The angles of the last picture; undefined before there is one.
+  #shown;
   #isDragging = false;
   #sun = makeSvg("g");
   #timer = 0;
@@ -65,8 +67,10 @@ export class SunDome {
     if (/^-?[\d.]+,-?[\d.]+/.test(text)) this.#default = text;
   }
 
-  /** Draws the sun as the settings have it, seen by the camera of the last picture. */
-  update(camera) {
+  /** Draws the sun as the settings have it, or else the last picture, seen by its camera. */
+  update(message) {
+    const camera = message?.camera;
+    if (message) this.#shown = message.sun ?? null;
     if (camera && !this.#isDragging) this.#turn = anglesOf(camera.position.map((x, i) => x - camera.look_at[i]))[0];
     const angles = this.#angles();
     this.#sun.style.display = angles ? "" : "none";
@@ -89,7 +93,9 @@ export class SunDome {
 
   #suns() {
     const suns = this.#settings.get("render", "sun");
-    return Array.isArray(suns) ? suns : suns ? [suns] : [this.#default];
+    if (suns && suns.length) return Array.isArray(suns) ? suns : [suns];
+    if (this.#shown === undefined) return [this.#default];
+    return [this.#shown ? this.#shown.map((angle, i) => short(i ? angle : (angle + 360) % 360, 4)).join(",") : "none"];
   }
 
   #angles() {

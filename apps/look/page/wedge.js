@@ -46,10 +46,11 @@ export class Wedge {
       for (const control of Object.values(controls))
         if ((control.views ?? [this.#view]).includes(this.#view) && !["flag", "file"].includes(control.type) && !control.repeats && !["view", "camera-position", "look-at", "up"].includes(control.name))
           select.append(make("option", { value: `${verb} ${control.name}` }, labelOf(control.name)));
-    const values = make("input", { "aria-label": `${title}: values, with commas between them`, placeholder: "values, with commas between them", autocomplete: "off", spellcheck: "false" });
+    const values = make("input", { "aria-label": `${title}: values, with commas between them`, placeholder: "values, with commas between them, or ; where they have commas", autocomplete: "off", spellcheck: "false" });
     const suggest = () => {
       const control = this.#control(select.value);
-      values.value = control ? this.#suggested(control).join(", ") : "";
+      const suggested = control ? this.#suggested(control) : [];
+      values.value = suggested.some((value) => value.includes(",")) ? `${suggested.join("; ")};` : suggested.join(", ");
       values.disabled = !control;
     };
     select.addEventListener("change", suggest);
@@ -89,6 +90,9 @@ export class Wedge {
     if (!rows || rows.values.length === 0) return;
     const isPair = columns && columns.values.length > 0;
     const body = this.#body();
+    // As a control takes away what it excludes.
+    for (const { verb, option } of isPair ? [rows, columns] : [rows])
+      for (const other of this.#settings.table[verb][option].excludes ?? []) delete body.settings[verb][other];
     const width = 320, height = Math.max(16, Math.round((width * body.size[1]) / body.size[0]));
     const across = isPair ? columns.values.length : Math.min(rows.values.length, window.innerWidth < 760 ? 2 : 4);
     const sheet = byId("wedge-sheet");
@@ -120,13 +124,19 @@ export class Wedge {
     }
   }
 
-  take({ revision, index, count, mime, label }, payload) {
+  take({ revision, index, count, mime, label, error }, payload) {
     const cell = this.#cells[index];
     if (revision !== this.#revision || !cell) return;
-    const address = URL.createObjectURL(new Blob([payload], { type: mime }));
-    this.#addresses.push(address);
-    cell.firstChild.replaceWith(make("img", { src: address, alt: label }));
-    const done = this.#cells.filter((one) => one.firstChild.tagName === "IMG").length;
+    if (error) {
+      cell.firstChild.textContent = error;
+      cell.firstChild.classList.add("error");
+    } else {
+      const address = URL.createObjectURL(new Blob([payload], { type: mime }));
+      this.#addresses.push(address);
+      cell.firstChild.replaceWith(make("img", { src: address, alt: label }));
+    }
+    cell.dataset.done = "";
+    const done = this.#cells.filter((one) => "done" in one.dataset).length;
     byId("wedge-state").textContent = done === count ? "Click a picture to take its values." : `${done} of ${count}`;
   }
 }

@@ -159,6 +159,9 @@ PictureOptions PictureOptions::resolved(const RenderVolume& volume, const Run& r
   result.render.shutter = shutter;
   result.volumeFlows = volumeFlows || !volumes.velocityGrids.empty();
   result.render.volumeMotion = result.motion();
+  if (result.volumeFlows && std::ranges::count(result.render.aovs, "motion") > 0)
+    run.note(
+        "--aov motion: is that of the camera and of --volume-motion; velocities of the volume are not in it");
   if (shutter.isInstant() && std::ranges::count(result.render.aovs, "motion") > 0)
     result.render.nextCamera = result.laterCamera(1);
   result.render.seed = std::uint32_t(seed);
