@@ -5,6 +5,7 @@
 #include "nephele/levelset/mesh/mass_properties.h"
 #include "nephele/levelset/mesh/mesh_repair.h"
 #include "tests/levelset/felt/levelset_felt.h"
+#include "tests/support/run_program.h"
 
 namespace nephele::felt {
 namespace {
@@ -66,9 +67,12 @@ TEST(FeltShapes, AreCutAsWideAsAsked) {
 }
 
 TEST(FeltShapes, KeepNumbersThatAreSetInAttributesOfSeveral) {
+  const test::TemporaryFolder folder;
   auto values =
       ran("shape ball = ls2shape(sphere((0,0,0), 1), 16); shape a = setattribute(ball, \"color.r\", 0.25);\n"
-          "write(\"a.ply\", a); float r = eval(attribute(setattribute(a, \"color.r\", 0.75), \"color.r\"), "
+          "write(\"" +
+          folder.file("a.ply") +
+          "\", a); float r = eval(attribute(setattribute(a, \"color.r\", 0.75), \"color.r\"), "
           "(0,1,0));");
   EXPECT_NEAR(values["r"].as<double>(), 0.75, 1e-6);
 }
