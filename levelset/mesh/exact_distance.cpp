@@ -188,7 +188,7 @@ ExactDistance::Hit ExactDistance::at(const Vec3d& p, Cursor& cursor) const {
   const Vec3d away = p - hit.point, &normal = normals_[hit.triangle][std::size_t(nearest.feature)];
   const double distance = length(away);
   bool isInBox = true;
-  for (int c = 0; c < 3; ++c) isInBox = isInBox && p[c] >= low_[c] && p[c] <= high_[c];
+  for (int axis = 0; axis < 3; ++axis) isInBox = isInBox && p[axis] >= low_[axis] && p[axis] <= high_[axis];
   const bool isBehind = isSolid_ && dot(away, normal) < 0;
   const double side = isBehind && isInBox ? 1.0 : -1.0;
   hit.distance = side * distance;
