@@ -51,6 +51,25 @@ std::filesystem::path folderOfLooks() {
          "looks";
 }
 
+/// The same text, as long, with blanks for comments.
+std::string withoutComments(std::string text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') {
+      for (++i; i < text.size() && text[i] != '"' && text[i] != '\n'; ++i)
+        if (text[i] == '\\') ++i;
+      continue;
+    }
+    const std::string_view rest = std::string_view(text).substr(i);
+    if (!rest.starts_with("//") && !rest.starts_with("/*")) continue;
+    const std::size_t found = rest.starts_with("//") ? rest.find('\n') : rest.find("*/", 2);
+    const std::size_t end = found == rest.npos ? text.size() : i + found + (rest.starts_with("//") ? 0 : 2);
+    for (; i < end; ++i)
+      if (text[i] != '\n') text[i] = ' ';
+    --i;
+  }
+  return text;
+}
+
 }  // namespace
 
 std::vector<std::string> LookExports::volumeLine(const std::string& output) const {
@@ -126,29 +145,6 @@ std::string LookExports::recipe() const {
   addTable(text, "render", render);
   return text;
 }
-
-namespace {
-
-/// The same text, as long, with blanks for comments.
-std::string withoutComments(std::string text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '"') {
-      for (++i; i < text.size() && text[i] != '"' && text[i] != '\n'; ++i)
-        if (text[i] == '\\') ++i;
-      continue;
-    }
-    const std::string_view rest = std::string_view(text).substr(i);
-    if (!rest.starts_with("//") && !rest.starts_with("/*")) continue;
-    const std::size_t found = rest.starts_with("//") ? rest.find('\n') : rest.find("*/", 2);
-    const std::size_t end = found == rest.npos ? text.size() : i + found + (rest.starts_with("//") ? 0 : 2);
-    for (; i < end; ++i)
-      if (text[i] != '\n') text[i] = ' ';
-    --i;
-  }
-  return text;
-}
-
-}  // namespace
 
 std::string LookExports::script() const {
   std::ifstream file(subject.path, std::ios::binary);

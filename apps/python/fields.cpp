@@ -388,12 +388,6 @@ std::string nameFrom(const py::handle& key, const std::string& what) {
   return key.cast<std::string>();
 }
 
-std::string pathFrom(const py::handle& path) {
-  const auto text = py::reinterpret_steal<py::object>(PyOS_FSPath(path.ptr()));
-  if (!text) throw py::error_already_set();
-  return text.cast<std::string>();
-}
-
 std::string shapeText(const py::array& array) {
   return "an array of shape " + std::string(py::str(array.attr("shape")));
 }

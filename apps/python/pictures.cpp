@@ -111,6 +111,13 @@ Self makePicture(const py::object& object, const std::optional<py::dict>& layers
   return content;
 }
 
+/// The path that a text, bytes or a path of pathlib is.
+std::string pathFrom(const py::handle& path) {
+  const auto text = py::reinterpret_steal<py::object>(PyOS_FSPath(path.ptr()));
+  if (!text) throw py::error_already_set();
+  return text.cast<std::string>();
+}
+
 void save(const Self& self, const py::object& file, const std::string& view, double exposure,
           const std::array<float, 3>& background) {
   const std::string path = pathFrom(file);

@@ -85,8 +85,6 @@ Packed<T> packedFrom(const py::handle& object, const std::string& what, Numbers 
 std::string shapeText(const py::array& array);
 /// The name that a key of a dict is. @throws py::type_error naming `what` unless it is a text.
 std::string nameFrom(const py::handle& key, const std::string& what);
-/// The path that a text, bytes or a path of pathlib is. @throws py::type_error
-std::string pathFrom(const py::handle& path);
 
 /// An array of these values that Python sees without a copy and cannot write; `owner` lives as long as it.
 template <class T>

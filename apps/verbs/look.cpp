@@ -1,11 +1,9 @@
 #include <fmt/format.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "apps/app.h"
+#include "apps/look/browser.h"
 #include "apps/look/files_watch.h"
 #include "apps/look/line.h"
 #include "apps/look/server.h"
@@ -41,17 +39,6 @@ void bindOptions(CLI::App& app, LookArguments& options) {
           ->default_str("cloud; transfer for two meshes"),
       {"cloud", "surface", "checker", "wisps", "pieces", "transfer"});
   app.add_flag("--no-browser", options.hasNoBrowser, "Only print the address.");
-}
-
-void openBrowser(const std::string& address) {
-  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
-  const pid_t child = fork();
-  if (child == 0) {
-    // Its parent ends at once, and the system's first process takes it over and waits for it.
-    if (fork() == 0) execlp("xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
-    _exit(0);
-  }
-  if (child > 0) waitpid(child, nullptr, 0);
 }
 
 void look(const LookArguments& options, Run& run) {

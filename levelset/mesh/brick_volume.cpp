@@ -11,7 +11,7 @@
 #include <span>
 #include <utility>
 
-#include "nephele/levelset/mesh/marching_cubes_table.h"
+#include "nephele/levelset/mesh/detail/marching_cubes_table.h"
 
 namespace nephele::detail {
 

@@ -1,6 +1,6 @@
 // Marching cubes on bricks (Lorensen and Cline 1987), with the faces that its original tables leave open
 // decided by the saddle of the bilinear interpolant on the face (Nielson and Hamann 1991);
-// marching_cubes_table.cpp makes the triangles.
+// detail/marching_cubes_table.cpp makes the triangles.
 //
 // A brick owns its 8^3 cells and the grid edges that start at its samples. The first pass finds the bricks
 // that the surface crosses and counts their vertices and triangles; running sums then give every brick its
@@ -22,7 +22,7 @@
 #include <limits>
 
 #include "nephele/levelset/grid/large_buffer.h"
-#include "nephele/levelset/mesh/marching_cubes_table.h"
+#include "nephele/levelset/mesh/detail/marching_cubes_table.h"
 #include "nephele/modeling/base/error.h"
 #include "nephele/modeling/base/parallel.h"
 #include "nephele/modeling/base/printable.h"

@@ -16,8 +16,6 @@ struct Ray {
   Vec3d direction;
 };
 
-/// That of a full-frame still camera, millimetres.
-inline constexpr double kFilmWidth = 36;
 /// Horizontal angle of view in degrees of a lens of `focalLength` in front of a film `filmWidth` wide (the
 /// same unit, usually millimetres), focused at infinity: 2 atan(filmWidth / (2 focalLength)).
 double fovDegreesOf(double focalLength, double filmWidth);

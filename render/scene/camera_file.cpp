@@ -163,7 +163,7 @@ CameraKey keyOf(const Fields& fields, const RotationOrder& order, std::optional<
     if (!(*focal > 0))
       fields.refuse("focal_length",
                     fmt::format("frame {:g}: focal_length must be above 0, got {:g}", key.frame, *focal));
-    key.fovDegrees = fovDegreesOf(*focal, filmWidth.value_or(kFilmWidth));
+    key.fovDegrees = fovDegreesOf(*focal, filmWidth.value_or(CameraKey::kFilmWidth));
     key.hasFocalLength = true;
   }
   key.filmWidth = filmWidth;

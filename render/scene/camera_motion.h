@@ -19,6 +19,9 @@ struct Shutter {
 
 /// What a camera does at one frame. Everything that is optional may be given at some frames only.
 struct CameraKey {
+  /// Of a full-frame still camera, millimetres.
+  static constexpr double kFilmWidth = 36;
+
   double frame = 0.0;
   Vec3d position{};
   /// Camera to world; the camera looks along its own -z. Not used where there is a target.

@@ -89,7 +89,7 @@ void addLens(CLI::App& app, CameraOptions& options) {
               "Focal length in millimetres, instead of --fov.")
       ->excludes(fov);
   addOptional(app, "--film-width", options.filmWidth, 0.1, 1e5, "Width of the film in millimetres.")
-      ->default_str(fmt::format("{:g}", kFilmWidth));
+      ->default_str(fmt::format("{:g}", CameraKey::kFilmWidth));
   addChoice<Camera::Projection>(
       app, "--projection", options.frame.projection,
       {{"perspective", Camera::Projection::perspective}, {"orthographic", Camera::Projection::orthographic}},
@@ -177,8 +177,9 @@ class Placement {
     else if (options_.focalLength)
       frame.fovDegrees = float(fovDegreesOf(*options_.focalLength, filmWidth(key)));
     else if (key.fovDegrees && key.hasFocalLength && options_.filmWidth)
-      frame.fovDegrees = float(fovDegreesOf(
-          focalLengthOf(*key.fovDegrees, key.filmWidth.value_or(kFilmWidth)), *options_.filmWidth));
+      frame.fovDegrees =
+          float(fovDegreesOf(focalLengthOf(*key.fovDegrees, key.filmWidth.value_or(CameraKey::kFilmWidth)),
+                             *options_.filmWidth));
     else if (key.fovDegrees)
       frame.fovDegrees = float(*key.fovDegrees);
     else if (key.verticalFovDegrees) {
@@ -200,7 +201,7 @@ class Placement {
   }
 
   double filmWidth(const CameraKey& key) const {
-    return options_.filmWidth.value_or(key.filmWidth.value_or(kFilmWidth));
+    return options_.filmWidth.value_or(key.filmWidth.value_or(CameraKey::kFilmWidth));
   }
 
   // A camera that does not frame anything needs a width; all of a moving one's poses have the same.

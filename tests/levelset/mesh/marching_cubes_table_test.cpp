@@ -1,4 +1,4 @@
-#include "nephele/levelset/mesh/marching_cubes_table.h"
+#include "nephele/levelset/mesh/detail/marching_cubes_table.h"
 
 #include <gtest/gtest.h>
 

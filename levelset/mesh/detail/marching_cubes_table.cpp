@@ -7,7 +7,7 @@
 // corners in one face make a triangle without area when samples differ little. Where no such filling exists
 // the loop gets a centre point. Every loop becomes a disk. The trilinear interpolant can also hold a tunnel
 // between two loops of one cell; such tunnels, always thinner than a voxel, are closed here.
-#include "nephele/levelset/mesh/marching_cubes_table.h"
+#include "nephele/levelset/mesh/detail/marching_cubes_table.h"
 
 #include <bit>
 #include <limits>
